@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// Vector types of the whole project: GLM's, under one spelling, plus the axis-aligned box.
+#pragma once
+
+#include <cmath>
+#include <glm/glm.hpp>
+#include <limits>
+
+namespace farfield {
+
+using glm::dvec3;
+using glm::ivec3;
+using glm::mat3;
+using glm::mat4x3;
+using glm::uvec3;
+using glm::uvec4;
+using glm::vec2;
+using glm::vec3;
+using glm::vec4;
+
+inline constexpr float kPi = 3.14159265358979323846f;
+inline constexpr float kInvPi = 0.31830988618379067154f;
+
+/// Axis-aligned box. Default constructed it is empty: lower > upper, and extending it by a point gives that point.
+struct Box3 {
+  vec3 lower{std::numeric_limits<float>::infinity()};
+  vec3 upper{-std::numeric_limits<float>::infinity()};
+
+  bool is_empty() const { return lower.x > upper.x || lower.y > upper.y || lower.z > upper.z; }
+  /// Extent along each axis; zero for the empty box.
+  vec3 size() const { return is_empty() ? vec3(0.0f) : upper - lower; }
+  vec3 center() const { return 0.5f * (lower + upper); }
+  void extend(const vec3& point) {
+    lower = glm::min(lower, point);
+    upper = glm::max(upper, point);
+  }
+  void extend(const Box3& box) {
+    lower = glm::min(lower, box.lower);
+    upper = glm::max(upper, box.upper);
+  }
+};
+
+inline float max_component(const vec3& v) { return std::max(v.x, std::max(v.y, v.z)); }
+inline float min_component(const vec3& v) { return std::min(v.x, std::min(v.y, v.z)); }
+inline bool is_finite(const vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+/// An orthonormal basis around a unit vector, without branches near the pole [Duff et al. 2017].
+struct Frame {
+  vec3 x, y, z;
+
+  explicit Frame(const vec3& unit_z) : z(unit_z) {
+    const float sign = std::copysign(1.0f, z.z);
+    const float a = -1.0f / (sign + z.z);
+    const float b = z.x * z.y * a;
+    x = vec3(1.0f + sign * z.x * z.x * a, sign * b, -sign * z.x);
+    y = vec3(b, sign + z.y * z.y * a, -z.y);
+  }
+  vec3 to_world(const vec3& v) const { return v.x * x + v.y * y + v.z * z; }
+  vec3 to_local(const vec3& v) const { return {glm::dot(v, x), glm::dot(v, y), glm::dot(v, z)}; }
+};
+
+}  // namespace farfield

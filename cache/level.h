@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+// One level of a baked asset: the arrays that the bake writes, that lie in the file, and that rays read in place.
+//
+// A level is a surface (quads with one or two faces each, a material per face) and a brick volume. Every array is
+// a *section*. A level has only the sections that its asset needs: an absent section means the default written
+// beside it. Arrays of one group (faces, voxels) have the same length.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/vec.h"
+
+namespace farfield {
+
+/// Vertices of one Embree quad. Embree splits it along v1-v3: face 0 is (v0, v1, v3), face 1 is (v2, v3, v1).
+/// A lone triangle (a, b, c) is stored as (a, b, c, c): face 0 is the triangle, face 1 is degenerate and absent.
+struct Quad {
+  uint32_t v0, v1, v2, v3;
+  bool is_pair() const { return v2 != v3; }
+};
+static_assert(sizeof(Quad) == 16);
+
+/// SGGX matrix of a face in 12 bytes: sigma = sqrt of the diagonal as unorm16 (largest eigenvalue 1), correlations
+/// as snorm16. Codec: scattering/sggx_codec.h. Surfaces need more bits than flakes: alpha = 0.01 is an eigenvalue of 1e-4.
+struct PackedSurfaceSggx {
+  std::array<uint16_t, 3> sigma;
+  std::array<int16_t, 3> correlation;
+};
+static_assert(sizeof(PackedSurfaceSggx) == 12);
+
+/// SGGX matrix of a voxel in 6 bytes (thesis 10.1.3; formula notes 7.10). Codec: scattering/sggx_codec.h.
+struct PackedFlakeSggx {
+  std::array<uint8_t, 3> sigma;
+  std::array<int8_t, 3> correlation;
+};
+static_assert(sizeof(PackedFlakeSggx) == 6);
+
+/// Linear RGB in [0, 1], each channel stored as round(255 sqrt(c)): finer where the eye is.
+struct PackedColor {
+  std::array<uint8_t, 3> sqrt_rgb;
+  friend bool operator==(const PackedColor&, const PackedColor&) = default;
+};
+PackedColor pack_color(const vec3& linear_rgb);
+vec3 unpack_color(PackedColor color);
+
+/// A scalar in [0, 1] as round(255 x).
+uint8_t pack_unorm8(float x);
+inline float unpack_unorm8(uint8_t x) { return static_cast<float>(x) * (1.0f / 255.0f); }
+
+inline constexpr int kBrickSide = 8;                                       ///< voxels along a brick's edge
+inline constexpr int kBrickVoxels = kBrickSide * kBrickSide * kBrickSide;  ///< 512
+inline constexpr uint32_t kNoBrick = 0xffffffffu;                          ///< brick table entry of an empty brick
+
+/// One stored brick. The density of voxel i (x fastest, then y, then z) is density[i] / 255 * density_scale, in 1 / scene unit:
+/// the attenuation coefficient rho_g of formula notes section 1 (lambda_max(S) = 1), so that sigma_t(w) = rho sqrt(w^T S w)
+/// and density_scale bounds sigma_t in the brick. Non-zero densities never round to 0. The payload of voxel i, when its density is
+/// not 0, is at payload_base + (number of non-zero densities before i) = payload_base + rank(i).
+struct alignas(64) Brick {
+  std::array<uint64_t, 8> mask;      ///< bit i % 64 of word i / 64: density of voxel i is not 0
+  std::array<uint16_t, 8> prefix;    ///< non-zero voxels in the words before this one
+  float density_scale;               ///< > 0
+  uint32_t payload_base;             ///< index into the voxel sections
+  std::array<uint8_t, 40> reserved;  ///< 0
+  std::array<uint8_t, kBrickVoxels> density;
+
+  /// Index of voxel i's payload. Only for voxels with density[i] != 0.
+  uint32_t payload_index(int i) const {
+    const uint64_t below = mask[static_cast<size_t>(i >> 6)] & ((uint64_t{1} << (i & 63)) - 1);
+    return payload_base + prefix[static_cast<size_t>(i >> 6)] + static_cast<uint32_t>(__builtin_popcountll(below));
+  }
+};
+static_assert(sizeof(Brick) == 640);
+
+/// Where a morph map sends things of level k-1 (thesis 8.1.2, 10.1.2).
+inline constexpr uint32_t kMorphVoxelized = 0xffffffffu;  ///< it became part of the volume of level k: fades out
+inline constexpr uint32_t kMorphCollapsed = 0xfffffffeu;  ///< (faces) its area shrinks to 0 while vertices move
+
+/// What every level has besides arrays. Lengths are in the asset's local units, positions relative to its origin.
+struct LevelHeader {
+  uint32_t level = 0;        ///< k
+  float resolution = 0;      ///< r_k > 0
+  Box3 bounds;               ///< of surface and active voxels
+  ivec3 brick_dims{0};       ///< bricks along x, y, z; 0 without volume
+  vec3 volume_origin{0.0f};  ///< lower corner of brick (0,0,0); voxel size is `resolution`
+};
+
+/// The arrays, owned (Array = std::vector<T>) while baking, or as spans into a mapped file at run time.
+template <template <typename> class Array>
+struct LevelArrays {
+  // Surface
+  Array<vec3> positions;              ///< vertices
+  Array<Quad> quads;                  ///< in Morton order
+  Array<uint32_t> quad_first_face;    ///< face 0 of each quad; face 1, if any, follows it
+  Array<PackedSurfaceSggx> face_sggx; ///< distribution of normals; absent: n n^T of the geometric normal
+  Array<PackedColor> face_diffuse;    ///< diffuse albedo; absent: 0
+  Array<PackedColor> face_specular;   ///< specular reflectance at normal incidence; absent: 0
+  Array<uint8_t> face_roughness2;     ///< unorm8 of alpha^2 of the specular lobe; present with face_specular
+  Array<PackedColor> face_transmission;  ///< diffuse transmission albedo; absent: 0
+  // Volume
+  Array<uint32_t> brick_table;        ///< brick_dims.x * y * z indices into bricks or kNoBrick, x fastest
+  Array<Brick> bricks;                ///< in the order of the table
+  Array<PackedFlakeSggx> voxel_sggx;  ///< absent: identity (isotropic flakes)
+  Array<PackedColor> voxel_diffuse;   ///< as for faces
+  Array<PackedColor> voxel_specular;
+  Array<uint8_t> voxel_roughness2;
+  Array<PackedColor> voxel_transmission;
+  Array<uint8_t> voxel_self_shadowing;  ///< unorm8 of A in (0, 1] (thesis 12.2); absent: 1
+  // Morph map from level k-1
+  Array<uint32_t> morph_vertex;  ///< for each vertex of level k-1: vertex of this level, or kMorphVoxelized
+  Array<uint32_t> morph_face;    ///< for each face of level k-1: face of this level, kMorphCollapsed or kMorphVoxelized
+
+  bool has_surface() const { return !quads.empty(); }
+  bool has_volume() const { return !bricks.empty(); }
+};
+
+template <typename T>
+using OwnedArray = std::vector<T>;
+template <typename T>
+using ArrayView = std::span<const T>;
+
+/// Number of faces of a level's surface.
+template <template <typename> class Array>
+uint32_t face_count(const LevelArrays<Array>& level) {
+  if (level.quads.empty()) return 0;
+  return level.quad_first_face.back() + (level.quads.back().is_pair() ? 2u : 1u);
+}
+
+/// Number of active voxels (stored payloads).
+template <template <typename> class Array>
+uint32_t voxel_count(const LevelArrays<Array>& level) {
+  if (level.bricks.empty()) return 0;
+  const Brick& last = level.bricks.back();
+  return last.payload_base + last.prefix[7] + static_cast<uint32_t>(__builtin_popcountll(last.mask[7]));
+}
+
+/// A level in memory that owns its arrays: what the bake makes. A plain value.
+struct LevelData : LevelArrays<OwnedArray> {
+  LevelHeader header;
+};
+
+/// A level whose arrays lie elsewhere (a mapped file, a LevelData): what rays read. Valid while its owner lives.
+struct LevelView : LevelArrays<ArrayView> {
+  LevelHeader header;
+};
+LevelView view_of(const LevelData& level);
+
+}  // namespace farfield

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// manifest.json of a baked asset: what was baked from what, and what each level costs and misses.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "base/vec.h"
+
+namespace farfield {
+
+inline constexpr int kFormatVersion = 1;
+
+/// Errors of a level as DESIGN defines them, signed fractions; absent until `farfield evaluate` has run.
+struct LevelErrors {
+  double occlusion_error = 0;
+  double occlusion_rms = 0;
+  double color_error = 0;
+};
+
+/// One level's row of the manifest.
+struct LevelEntry {
+  uint32_t level = 0;
+  double resolution = 0;       ///< r_k, local units
+  uint32_t grid = 0;           ///< longest side of the bounds / r_k, rounded
+  std::string file;            ///< name inside the asset's folder
+  uint64_t file_bytes = 0;
+  uint64_t file_hash = 0;      ///< XXH3 of the whole file
+  uint64_t triangles = 0;
+  uint64_t voxels = 0;
+  uint64_t bricks = 0;
+  uint64_t resident_bytes = 0; ///< mapped bytes that stay, plus BVH, once loaded
+  uint64_t build_peak_bytes = 0;  ///< further bytes needed while the BVH is built
+  std::optional<LevelErrors> errors;
+};
+
+/// The manifest. Levels are sorted by `level`; level 0 is the source. A level that would save nothing over a finer one is
+/// not written, so numbers may have gaps; the last one is the root.
+struct Manifest {
+  int version = kFormatVersion;
+  std::string generator;       ///< "farfield 0.1.0"
+  std::string source;          ///< file name (no folders) of the source
+  uint64_t source_hash = 0;    ///< XXH3 of the source's bytes and of the files it refers to
+  std::string options;         ///< canonical text of the bake options, so that equal text and hash mean equal bytes
+  dvec3 origin{0.0};           ///< positions are relative to this point of the source's space
+  Box3 bounds;                 ///< of all levels, relative to origin
+  double base_resolution = 0;  ///< r_0
+  std::vector<vec3> hull;      ///< points whose convex hull contains all levels (tight instance bounds)
+  std::vector<LevelEntry> levels;
+};
+
+/// Reads DIR/manifest.json. Untrusted: sizes, ranges and names are checked (a level's file may not leave the folder).
+/// Errors: NotFound, Io, BadFile, Unsupported (newer format version).
+Result<Manifest> read_manifest(const std::filesystem::path& asset_dir);
+
+/// Writes DIR/manifest.json atomically (temporary name, sync, rename). Errors: Io.
+Result<void> write_manifest(const std::filesystem::path& asset_dir, const Manifest& manifest);
+
+}  // namespace farfield

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// A hit on Farfield geometry, ready to be shaded.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+
+#include "farfield/export.h"
+#include "farfield/random.h"
+#include "farfield/ray.h"
+
+namespace farfield {
+
+namespace detail {
+struct InteractionModel;
+}
+
+/// One sampled direction. A zero weight is a failed sample: end the path.
+struct ScatterSample {
+  glm::vec3 wi{0.0f};      ///< unit, away from the point
+  glm::vec3 weight{0.0f};  ///< linear RGB: surfaces f |cos| / pdf, volumes albedo * phase / pdf
+  float pdf = 0;           ///< per steradian: pdf(wi), for multiple importance sampling
+};
+
+/// Where a ray met an instance and how light scatters there. A value that refers to the Runtime: use it before the next plan_frame().
+/// All directions are unit vectors in world space that point away from the point. Safe from any thread.
+class FARFIELD_API Interaction {
+ public:
+  enum class Kind : uint8_t { Surface, Volume };
+
+  Kind kind = Kind::Surface;
+  glm::vec3 position{0.0f};          ///< world
+  glm::vec3 wo{0.0f};                ///< where the ray came from
+  glm::vec3 geometric_normal{0.0f};  ///< unit, on wo's side; zero in volumes
+  float footprint = 0;               ///< world width of what the ray stands for here
+  uint32_t instance = 0;             ///< InstanceId of the hit
+  uint32_t level = 0;                ///< k of the level that was hit
+  float lambda = 0;                  ///< continuous level that the ray asked for
+  glm::vec3 albedo{0.0f};            ///< diffuse + specular + transmission, for AOVs and denoisers
+
+  /// Origin for a ray that leaves in direction wi: offset to wi's side of a surface, the point itself in a volume.
+  glm::vec3 ray_origin(const glm::vec3& wi) const;
+  /// Draws wi. The number of values taken from rng varies.
+  ScatterSample sample(Rng& rng) const;
+  /// Surfaces: BRDF (and transmission) times |cos|; volumes: albedo times phase function. Linear RGB per steradian.
+  /// For diffuse microfacets an unbiased one-sample estimate: rng supplies the sample.
+  glm::vec3 eval(const glm::vec3& wi, Rng& rng) const;
+  /// Density with which sample() draws wi, per steradian.
+  float pdf(const glm::vec3& wi) const;
+  /// Diameter spread to give the next ray's cone, by how wide the lobe that was sampled is. >= the incoming spread.
+  float next_cone_spread(const ScatterSample& sample, float cone_spread) const;
+
+ private:
+  friend struct detail::InteractionModel;
+  alignas(16) unsigned char model_[256];  ///< the scattering model in world space
+};
+
+}  // namespace farfield
