@@ -23,7 +23,8 @@ std::string format_bytes(uint64_t bytes) {
 
 Result<uint64_t> parse_bytes(std::string_view text) {
   const auto bad = [&] {
-    return make_error(ErrorCode::InvalidArgument, fmt::format("'{}' is not a size; write for example 512M or 4G", text));
+    return make_error(ErrorCode::InvalidArgument,
+                      fmt::format("'{}' is not a size; write for example 512M or 4G", text));
   };
   double value = 0.0;
   const auto [rest, status] = std::from_chars(text.data(), text.data() + text.size(), value);

@@ -49,16 +49,16 @@ void parallel_for(size_t count, size_t grain, const std::function<void(size_t, s
 #endif
 
 ThreadLimit::ThreadLimit(int threads)
-    : control_(threads > 0 ? new tbb::global_control(tbb::global_control::max_allowed_parallelism,
-                                                     static_cast<size_t>(threads))
-                           : nullptr) {}
+    : control_(threads > 0
+                   ? new tbb::global_control(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads))
+                   : nullptr) {}
 
 ThreadLimit::~ThreadLimit() { delete static_cast<tbb::global_control*>(control_); }
 
 int thread_count() {
-  return static_cast<int>(std::min<size_t>(
-      tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism),
-      static_cast<size_t>(tbb::this_task_arena::max_concurrency())));
+  return static_cast<int>(
+      std::min<size_t>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism),
+                       static_cast<size_t>(tbb::this_task_arena::max_concurrency())));
 }
 
 }  // namespace farfield

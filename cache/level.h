@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/vec.h"
+#include "scattering/sggx_codec.h"
 
 namespace farfield {
 
@@ -22,21 +23,6 @@ struct Quad {
   bool is_pair() const { return v2 != v3; }
 };
 static_assert(sizeof(Quad) == 16);
-
-/// SGGX matrix of a face in 12 bytes: sigma = sqrt of the diagonal as unorm16 (largest eigenvalue 1), correlations
-/// as snorm16. Codec: scattering/sggx_codec.h. Surfaces need more bits than flakes: alpha = 0.01 is an eigenvalue of 1e-4.
-struct PackedSurfaceSggx {
-  std::array<uint16_t, 3> sigma;
-  std::array<int16_t, 3> correlation;
-};
-static_assert(sizeof(PackedSurfaceSggx) == 12);
-
-/// SGGX matrix of a voxel in 6 bytes (thesis 10.1.3; formula notes 7.10). Codec: scattering/sggx_codec.h.
-struct PackedFlakeSggx {
-  std::array<uint8_t, 3> sigma;
-  std::array<int8_t, 3> correlation;
-};
-static_assert(sizeof(PackedFlakeSggx) == 6);
 
 /// Linear RGB in [0, 1], each channel stored as round(255 sqrt(c)): finer where the eye is.
 struct PackedColor {
@@ -54,10 +40,11 @@ inline constexpr int kBrickSide = 8;                                       ///< 
 inline constexpr int kBrickVoxels = kBrickSide * kBrickSide * kBrickSide;  ///< 512
 inline constexpr uint32_t kNoBrick = 0xffffffffu;                          ///< brick table entry of an empty brick
 
-/// One stored brick. The density of voxel i (x fastest, then y, then z) is density[i] / 255 * density_scale, in 1 / scene unit:
-/// the attenuation coefficient rho_g of formula notes section 1 (lambda_max(S) = 1), so that sigma_t(w) = rho sqrt(w^T S w)
-/// and density_scale bounds sigma_t in the brick. Non-zero densities never round to 0. The payload of voxel i, when its density is
-/// not 0, is at payload_base + (number of non-zero densities before i) = payload_base + rank(i).
+/// One stored brick. The density of voxel i (x fastest, then y, then z) is density[i] / 255 * density_scale, in 1 /
+/// scene unit: the attenuation coefficient rho_g of formula notes section 1 (lambda_max(S) = 1), so that sigma_t(w) =
+/// rho sqrt(w^T S w) and density_scale bounds sigma_t in the brick. Non-zero densities never round to 0. The payload of
+/// voxel i, when its density is not 0, is at payload_base + (number of non-zero densities before i) = payload_base +
+/// rank(i).
 struct alignas(64) Brick {
   std::array<uint64_t, 8> mask;      ///< bit i % 64 of word i / 64: density of voxel i is not 0
   std::array<uint16_t, 8> prefix;    ///< non-zero voxels in the words before this one
@@ -91,13 +78,13 @@ struct LevelHeader {
 template <template <typename> class Array>
 struct LevelArrays {
   // Surface
-  Array<vec3> positions;              ///< vertices
-  Array<Quad> quads;                  ///< in Morton order
-  Array<uint32_t> quad_first_face;    ///< face 0 of each quad; face 1, if any, follows it
-  Array<PackedSurfaceSggx> face_sggx; ///< distribution of normals; absent: n n^T of the geometric normal
-  Array<PackedColor> face_diffuse;    ///< diffuse albedo; absent: 0
-  Array<PackedColor> face_specular;   ///< specular reflectance at normal incidence; absent: 0
-  Array<uint8_t> face_roughness2;     ///< unorm8 of alpha^2 of the specular lobe; present with face_specular
+  Array<vec3> positions;                 ///< vertices
+  Array<Quad> quads;                     ///< in Morton order
+  Array<uint32_t> quad_first_face;       ///< face 0 of each quad; face 1, if any, follows it
+  Array<PackedSurfaceSggx> face_sggx;    ///< distribution of normals; absent: n n^T of the geometric normal
+  Array<PackedColor> face_diffuse;       ///< diffuse albedo; absent: 0
+  Array<PackedColor> face_specular;      ///< specular reflectance at normal incidence; absent: 0
+  Array<uint8_t> face_roughness2;        ///< unorm8 of alpha^2 of the specular lobe; present with face_specular
   Array<PackedColor> face_transmission;  ///< diffuse transmission albedo; absent: 0
   // Volume
   Array<uint32_t> brick_table;        ///< brick_dims.x * y * z indices into bricks or kNoBrick, x fastest

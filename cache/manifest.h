@@ -25,21 +25,21 @@ struct LevelErrors {
 /// One level's row of the manifest.
 struct LevelEntry {
   uint32_t level = 0;
-  double resolution = 0;       ///< r_k, local units
-  uint32_t grid = 0;           ///< longest side of the bounds / r_k, rounded
-  std::string file;            ///< name inside the asset's folder
+  double resolution = 0;  ///< r_k, local units
+  uint32_t grid = 0;      ///< longest side of the bounds / r_k, rounded
+  std::string file;       ///< name inside the asset's folder
   uint64_t file_bytes = 0;
-  uint64_t file_hash = 0;      ///< XXH3 of the whole file
+  uint64_t file_hash = 0;  ///< XXH3 of the whole file
   uint64_t triangles = 0;
   uint64_t voxels = 0;
   uint64_t bricks = 0;
-  uint64_t resident_bytes = 0; ///< mapped bytes that stay, plus BVH, once loaded
+  uint64_t resident_bytes = 0;    ///< mapped bytes that stay, plus BVH, once loaded
   uint64_t build_peak_bytes = 0;  ///< further bytes needed while the BVH is built
   std::optional<LevelErrors> errors;
 };
 
-/// The manifest. Levels are sorted by `level`; level 0 is the source. A level that would save nothing over a finer one is
-/// not written, so numbers may have gaps; the last one is the root.
+/// The manifest. Levels are sorted by `level`; level 0 is the source. A level that would save nothing over a finer one
+/// is not written, so numbers may have gaps; the last one is the root.
 struct Manifest {
   int version = kFormatVersion;
   std::string generator;       ///< "farfield 0.1.0"

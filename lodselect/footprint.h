@@ -24,8 +24,8 @@ struct FootprintCamera {
   float pixel_spread = 0;
 };
 
-/// lambda = log2(footprint / base_resolution), clamped to [0, coarsest_level]. Footprint 0 (or NaN) gives 0, infinity gives the
-/// coarsest level. Monotone in the footprint.
+/// lambda = log2(footprint / base_resolution), clamped to [0, coarsest_level]. Footprint 0 (or NaN) gives 0, infinity
+/// gives the coarsest level. Monotone in the footprint.
 float lambda_of_footprint(float footprint, float base_resolution, int coarsest_level);
 
 /// The finest (smallest) footprint that any of the cameras has on a box: at the box's nearest point. World space.

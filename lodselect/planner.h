@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The plan: the finest level each asset may use so that everything fits the budget (DESIGN, decision 5). Pure and deterministic.
+// The plan: the finest level each asset may use so that everything fits the budget (DESIGN, decision 5). Pure and
+// deterministic.
 #pragma once
 
 #include <cstdint>
@@ -20,15 +21,15 @@ struct PlanAsset {
 };
 
 struct Plan {
-  std::vector<uint32_t> finest;  ///< per asset: index into its stored levels; coarser ones are allowed too
-  uint64_t resident_bytes = 0;   ///< of everything the plan allows
-  uint64_t build_peak_bytes = 0; ///< of the largest single build
-  double bias = 0;               ///< pixel-weighted mean of how many levels coarser than asked; 0: nothing was given up
+  std::vector<uint32_t> finest;   ///< per asset: index into its stored levels; coarser ones are allowed too
+  uint64_t resident_bytes = 0;    ///< of everything the plan allows
+  uint64_t build_peak_bytes = 0;  ///< of the largest single build
+  double bias = 0;  ///< pixel-weighted mean of how many levels coarser than asked; 0: nothing was given up
 };
 
-/// Chooses each asset's finest level: what the cameras ask for, coarsened while resident + peak + fixed bytes exceed the budget,
-/// each time where the projected error grows least per byte freed (ties: lowest asset index).
-/// Errors: OutOfBudget if the roots alone do not fit; the message has the number of bytes that would.
+/// Chooses each asset's finest level: what the cameras ask for, coarsened while resident + peak + fixed bytes exceed
+/// the budget, each time where the projected error grows least per byte freed (ties: lowest asset index). Errors:
+/// OutOfBudget if the roots alone do not fit; the message has the number of bytes that would.
 Result<Plan> plan_levels(std::span<const PlanAsset> assets, uint64_t budget_bytes, uint64_t fixed_bytes);
 
 }  // namespace farfield

@@ -23,16 +23,17 @@ struct ResidentCost {
 };
 
 struct BakeOptions {
-  uint32_t finest_grid = 512;   ///< level 1: longest side of the bounds / r_1. A power of two >= coarsest_grid
-  uint32_t coarsest_grid = 8;   ///< last level, the root
+  uint32_t finest_grid = 512;     ///< level 1: longest side of the bounds / r_1. A power of two >= coarsest_grid
+  uint32_t coarsest_grid = 8;     ///< last level, the root
   uint32_t rays_per_voxel = 200;  ///< thesis 10.1.3
-  bool source_only = false;     ///< write only level 0 (what --full-detail renders)
+  bool source_only = false;       ///< write only level 0 (what --full-detail renders)
   ImportOptions import;
 
-  /// Measures a level as the runtime would load it. Given by the caller, because this room does not know the runtime's BVH.
-  /// Required.
+  /// Measures a level as the runtime would load it. Given by the caller, because this room does not know the runtime's
+  /// BVH. Required.
   std::function<Result<ResidentCost>(const LevelView&)> measure_resident;
-  /// Called from the baking thread with the stage's name ("level 3: voxelise") and how much of the whole is done, in [0, 1].
+  /// Called from the baking thread with the stage's name ("level 3: voxelise") and how much of the whole is done, in
+  /// [0, 1].
   std::function<void(const std::string& stage, double done)> progress;
   /// Polled often; when it becomes true the bake stops with Cancelled and what is finished stays for the next run.
   const std::atomic<bool>* cancel = nullptr;
@@ -42,12 +43,12 @@ struct BakeOptions {
 struct LevelReport {
   uint32_t level = 0;
   uint32_t grid = 0;
-  uint64_t macrosurface_triangles = 0;   ///< of the previous level's surface that stayed surface, before simplification
-  uint64_t voxelized_triangles = 0;      ///< all sub-resolution geometry up to this level
-  uint64_t triangles = 0;                ///< after simplification
+  uint64_t macrosurface_triangles = 0;  ///< of the previous level's surface that stayed surface, before simplification
+  uint64_t voxelized_triangles = 0;     ///< all sub-resolution geometry up to this level
+  uint64_t triangles = 0;               ///< after simplification
   uint64_t voxels = 0;
   double analysis_seconds = 0, simplify_seconds = 0, voxelize_seconds = 0, write_seconds = 0;
-  bool resumed = false;                  ///< taken from an earlier, interrupted bake
+  bool resumed = false;  ///< taken from an earlier, interrupted bake
 };
 
 struct BakeReport {
@@ -58,9 +59,11 @@ struct BakeReport {
   bool up_to_date = false;  ///< the folder already held exactly this bake; nothing was done
 };
 
-/// Bakes `source` into the folder `out` (created; conventionally NAME.farfield). Same source and options give the same bytes for
-/// any thread count. Interrupted bakes resume: finished levels are found by hash and kept; the manifest is written last.
-/// Errors: those of import_asset; InvalidArgument (options); Io (with nothing half-written under a final name); Cancelled.
-Result<BakeReport> bake(const std::filesystem::path& source, const std::filesystem::path& out, const BakeOptions& options);
+/// Bakes `source` into the folder `out` (created; conventionally NAME.farfield). Same source and options give the same
+/// bytes for any thread count. Interrupted bakes resume: finished levels are found by hash and kept; the manifest is
+/// written last. Errors: those of import_asset; InvalidArgument (options); Io (with nothing half-written under a final
+/// name); Cancelled.
+Result<BakeReport> bake(const std::filesystem::path& source, const std::filesystem::path& out,
+                        const BakeOptions& options);
 
 }  // namespace farfield

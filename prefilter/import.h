@@ -13,7 +13,8 @@
 namespace farfield {
 
 struct ImportOptions {
-  int mesh = -1;  ///< glTF only: import this mesh alone, in its own space; -1: all nodes of the default scene, flattened
+  int mesh =
+      -1;  ///< glTF only: import this mesh alone, in its own space; -1: all nodes of the default scene, flattened
 };
 
 struct ImportedAsset {
@@ -22,10 +23,11 @@ struct ImportedAsset {
   std::vector<std::string> warnings;  ///< one line each: dropped faces, missing textures, ignored features
 };
 
-/// Reads one asset. Polygons are triangulated (quads along the shorter diagonal, concave ones correctly), vertices that share a
-/// position are welded, textures are averaged over each face, alpha-masked faces are cut along the mask's outline, degenerate and
-/// NaN faces are dropped with a warning. Anything that leaves no face with area is an error.
-/// Errors: NotFound, Io, BadFile, Unsupported: one line that names the file, the place and the remedy. Never crashes on bad files.
+/// Reads one asset. Polygons are triangulated (quads along the shorter diagonal, concave ones correctly), vertices that
+/// share a position are welded, textures are averaged over each face, alpha-masked faces are cut along the mask's
+/// outline, degenerate and NaN faces are dropped with a warning. Anything that leaves no face with area is an error.
+/// Errors: NotFound, Io, BadFile, Unsupported: one line that names the file, the place and the remedy. Never crashes on
+/// bad files.
 Result<ImportedAsset> import_asset(const std::filesystem::path& path, const ImportOptions& options = {});
 
 }  // namespace farfield

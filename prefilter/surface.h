@@ -13,11 +13,11 @@ namespace farfield {
 
 /// Prefilterable reflectance of one face. All linear RGB, all in [0, 1]; all channels average linearly (thesis 8.3.5).
 struct FaceMaterial {
-  SymMat3 sggx;               ///< distribution of normals, local space, n n^T for a flat face
-  vec3 diffuse{0.0f};         ///< diffuse albedo
-  vec3 specular{0.0f};        ///< reflectance at normal incidence (F0)
-  vec3 transmission{0.0f};    ///< diffuse transmission albedo; diffuse + transmission <= 1
-  float roughness2 = 1.0f;    ///< alpha^2 of the specular GGX lobe, alpha = roughness^2 (glTF roughness)
+  SymMat3 sggx;             ///< distribution of normals, local space, n n^T for a flat face
+  vec3 diffuse{0.0f};       ///< diffuse albedo
+  vec3 specular{0.0f};      ///< reflectance at normal incidence (F0)
+  vec3 transmission{0.0f};  ///< diffuse transmission albedo; diffuse + transmission <= 1
+  float roughness2 = 1.0f;  ///< alpha^2 of the specular GGX lobe, alpha = roughness^2 (glTF roughness)
 };
 
 /// A triangle soup or mesh with shared vertices. Winding may be inconsistent; faces are two-sided.
@@ -25,7 +25,7 @@ struct Surface {
   std::vector<vec3> positions;          ///< relative to `origin`, finite
   std::vector<uvec3> triangles;         ///< indices < positions.size(), no repeated index
   std::vector<FaceMaterial> materials;  ///< one per triangle
-  dvec3 origin{0.0};                    ///< of positions in the source's space; (0,0,0) unless the source lies far from its origin
+  dvec3 origin{0.0};  ///< of positions in the source's space; (0,0,0) unless the source lies far from its origin
 
   Box3 bounds() const;
 };

@@ -22,8 +22,8 @@ struct ScatterSample {
   float pdf = 0;           ///< per steradian: pdf(wi), for multiple importance sampling
 };
 
-/// Where a ray met an instance and how light scatters there. A value that refers to the Runtime: use it before the next plan_frame().
-/// All directions are unit vectors in world space that point away from the point. Safe from any thread.
+/// Where a ray met an instance and how light scatters there. A value that refers to the Runtime: use it before the next
+/// plan_frame(). All directions are unit vectors in world space that point away from the point. Safe from any thread.
 class FARFIELD_API Interaction {
  public:
   enum class Kind : uint8_t { Surface, Volume };

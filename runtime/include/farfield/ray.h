@@ -13,18 +13,18 @@ inline constexpr uint32_t kNoInstance = 0xffffffffu;
 /// What Farfield remembers of the nearest hit on its geometry, enough to rebuild the interaction. Opaque to hosts.
 struct HitRecord {
   uint32_t instance = kNoInstance;
-  uint32_t element = 0;        ///< face of the surface, or payload index of the voxel
-  uint8_t level_slot = 0;      ///< index into the asset's stored levels
+  uint32_t element = 0;    ///< face of the surface, or payload index of the voxel
+  uint8_t level_slot = 0;  ///< index into the asset's stored levels
   bool is_volume = false;
-  float lambda = 0;            ///< continuous level that was asked for
-  float footprint = 0;         ///< world width of what the ray stands for there
+  float lambda = 0;                   ///< continuous level that was asked for
+  float footprint = 0;                ///< world width of what the ray stands for there
   float normal_local[3] = {0, 0, 0};  ///< geometric normal, instance space, unnormalised; surfaces only
 };
 
 /// The context to pass to rtcIntersect1 and rtcOccluded1 for rays that may meet Farfield geometry:
-/// `rtcIntersect1(scene, &ray_context.embree, &ray_hit)`. Farfield casts the context pointer back, so every single-ray query on a
-/// scene with Farfield geometry must pass one of these. Fill it anew for every ray. For packets and streams all lanes share one, and only
-/// distances and occlusion come back.
+/// `rtcIntersect1(scene, &ray_context.embree, &ray_hit)`. Farfield casts the context pointer back, so every single-ray
+/// query on a scene with Farfield geometry must pass one of these. Fill it anew for every ray. For packets and streams
+/// all lanes share one, and only distances and occlusion come back.
 struct RayContext {
   RTCIntersectContext embree;  ///< first member; initialised by the constructor
 

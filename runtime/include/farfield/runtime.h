@@ -47,9 +47,9 @@ struct RuntimeOptions {
   uint64_t budget_bytes = uint64_t{1} << 32;  ///< hard: mapped, heap and Embree bytes together, build peaks included
   Blend blend = Blend::Dissolve;
   Residency residency = Residency::Wait;
-  float lod_scale = 1.0f;                    ///< multiplies every footprint: > 1 coarser and cheaper, < 1 finer; > 0
-  std::optional<float> forced_lambda;        ///< every ray sees this lambda, whatever its footprint; for evaluation
-  MessageSink messages;                      ///< may be empty
+  float lod_scale = 1.0f;              ///< multiplies every footprint: > 1 coarser and cheaper, < 1 finer; > 0
+  std::optional<float> forced_lambda;  ///< every ray sees this lambda, whatever its footprint; for evaluation
+  MessageSink messages;                ///< may be empty
 };
 
 struct AssetId {
@@ -60,7 +60,8 @@ struct InstanceId {
 };
 
 /// A camera that fixes each instance's level: at distance d a pixel is pixel_width + pixel_spread * d world units wide.
-/// Perspective: width 0 and spread 2 tan(fov_y / 2) / image height in pixels. Orthographic: the pixel's width and spread 0.
+/// Perspective: width 0 and spread 2 tan(fov_y / 2) / image height in pixels. Orthographic: the pixel's width and
+/// spread 0.
 struct TessellationCamera {
   glm::vec3 position{0.0f};
   float pixel_width = 0;
@@ -69,44 +70,45 @@ struct TessellationCamera {
 
 /// One stored level of an open asset.
 struct LevelInfo {
-  uint32_t level;            ///< k
-  float resolution;          ///< r_k, local units
+  uint32_t level;    ///< k
+  float resolution;  ///< r_k, local units
   uint64_t triangles;
   uint64_t voxels;
   uint64_t file_bytes;
-  uint64_t resident_bytes;   ///< once loaded, BVH included
+  uint64_t resident_bytes;  ///< once loaded, BVH included
 };
 
 /// What plan_frame() decided.
 struct PlanSummary {
   std::vector<uint32_t> finest_level;  ///< per asset: k of the finest level that rays may use
-  uint64_t planned_bytes = 0;          ///< if everything the plan allows were loaded, build peak included; <= the budget
-  double bias = 0;                     ///< pixel-weighted mean of how many levels coarser than asked; 0: nothing given up
+  uint64_t planned_bytes = 0;  ///< if everything the plan allows were loaded, build peak included; <= the budget
+  double bias = 0;             ///< pixel-weighted mean of how many levels coarser than asked; 0: nothing given up
 };
 
 /// Counters since create(). Thread-safe snapshot.
 struct Stats {
-  uint64_t accounted_bytes = 0;       ///< now, by the budget's rules
+  uint64_t accounted_bytes = 0;  ///< now, by the budget's rules
   uint64_t peak_accounted_bytes = 0;
-  uint64_t levels_loaded = 0;         ///< loads, reloads included
+  uint64_t levels_loaded = 0;  ///< loads, reloads included
   uint64_t levels_resident = 0;
   uint64_t levels_released = 0;
-  uint64_t fallbacks = 0;             ///< rays served by a coarser level than planned (progressive mode, broken files)
-  double load_seconds = 0;            ///< summed over loads: map, check, build
+  uint64_t fallbacks = 0;   ///< rays served by a coarser level than planned (progressive mode, broken files)
+  double load_seconds = 0;  ///< summed over loads: map, check, build
 };
 
-/// Thread rule: interaction(), stats() and all ray queries are safe from any thread at any time between two plan_frame() calls.
-/// Everything else is for one thread at a time, with no ray in flight.
+/// Thread rule: interaction(), stats() and all ray queries are safe from any thread at any time between two
+/// plan_frame() calls. Everything else is for one thread at a time, with no ray in flight.
 class FARFIELD_API Runtime {
  public:
-  /// host_device: the device of the scene that attach() will be given; retained. Errors: InvalidArgument (budget 0, lod_scale <= 0).
+  /// host_device: the device of the scene that attach() will be given; retained. Errors: InvalidArgument (budget 0,
+  /// lod_scale <= 0).
   static Result<std::unique_ptr<Runtime>> create(RTCDevice host_device, const RuntimeOptions& options);
   ~Runtime();
   Runtime(const Runtime&) = delete;
   Runtime& operator=(const Runtime&) = delete;
 
-  /// Opens a baked asset: reads its manifest and checks it, loads its root. Opening the same folder again gives the same id.
-  /// Errors: NotFound, Io, BadFile, Unsupported, OutOfBudget (the message has the number that would do).
+  /// Opens a baked asset: reads its manifest and checks it, loads its root. Opening the same folder again gives the
+  /// same id. Errors: NotFound, Io, BadFile, Unsupported, OutOfBudget (the message has the number that would do).
   Result<AssetId> open_asset(const std::string& folder);
   /// The asset's stored levels, finest first.
   const std::vector<LevelInfo>& levels(AssetId asset) const;
@@ -116,17 +118,18 @@ class FARFIELD_API Runtime {
   /// Adds an instance. local_to_world: affine, invertible, finite. Errors: InvalidArgument.
   Result<InstanceId> add_instance(AssetId asset, const glm::mat4x3& local_to_world);
 
-  /// The cameras of the coming frame, or of the whole shot for levels that stay the same over it. At least one before plan_frame(),
-  /// unless forced_lambda is set.
+  /// The cameras of the coming frame, or of the whole shot for levels that stay the same over it. At least one before
+  /// plan_frame(), unless forced_lambda is set.
   void set_cameras(std::vector<TessellationCamera> cameras);
   /// Decides which levels the coming frame may use so that they fit the budget, releases what no longer is allowed.
   /// The first rays that need a level load it, or prefetch() does. Errors: OutOfBudget, InvalidArgument (no camera).
   Result<PlanSummary> plan_frame();
-  /// Loads what the cameras will certainly need under the current plan, ahead of the rays. Broken levels are reported and left out.
+  /// Loads what the cameras will certainly need under the current plan, ahead of the rays. Broken levels are reported
+  /// and left out.
   void prefetch();
 
-  /// Puts the user geometry into the host's scene and returns its geomID; the host commits the scene. Call again after adding
-  /// instances. All instances are primitives of this one geometry: primID is InstanceId::value.
+  /// Puts the user geometry into the host's scene and returns its geomID; the host commits the scene. Call again after
+  /// adding instances. All instances are primitives of this one geometry: primID is InstanceId::value.
   Result<unsigned> attach(RTCScene scene);
   unsigned geometry_id() const;
 
