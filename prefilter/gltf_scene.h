@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// A glTF file as a scene: which mesh stands where, what looks at it, what lights it. No mesh data is read here;
+// import_asset(path, {.mesh = i}) reads mesh i in its own space.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "base/vec.h"
+
+namespace farfield {
+
+struct GltfMesh {
+  std::string name;             ///< as in the file; may be empty or repeated
+  std::string asset_name;       ///< unique in the file, fit for a file name: what its baked asset is called
+  Box3 bounds;                  ///< mesh space, from the accessors' min and max (quantised ones decoded); may be empty
+  uint64_t triangle_count = 0;  ///< as the accessors promise it; 0 means there is nothing to bake
+};
+
+/// One node that shows a mesh.
+struct GltfInstance {
+  uint32_t mesh = 0;   ///< index into GltfScene::meshes
+  mat4x3 to_world{1};  ///< mesh space to world; may scale, mirror and shear; always finite and invertible
+  std::string name;    ///< of the node
+  uint32_t node = 0;   ///< index into GltfScene::nodes
+};
+
+/// A camera where it stands at some time. It looks along `forward`; right, up and forward are orthonormal (the node's
+/// scale is ignored, as glTF asks).
+struct GltfCamera {
+  std::string name;
+  vec3 position{0.0f};
+  vec3 right{1, 0, 0}, up{0, 1, 0}, forward{0, 0, -1};
+  bool is_orthographic = false;
+  float yfov_rad = 0.8f;                  ///< full vertical angle of a perspective camera
+  float aspect = 0;                       ///< width / height; 0: the file does not say, the image's shape decides
+  float half_width = 1, half_height = 1;  ///< of an orthographic view, scene units
+  float z_near = 0;                       ///< scene units along forward
+  uint32_t node = 0;                      ///< index into GltfScene::nodes
+};
+
+/// A light of KHR_lights_punctual where it stands at time 0. `color * intensity` is the file's photometric value:
+/// lux for directional lights, candela for point and spot lights.
+struct GltfLight {
+  enum class Type { Directional, Point, Spot };
+  Type type = Type::Directional;
+  std::string name;
+  vec3 color{1.0f};  ///< linear
+  float intensity = 1;
+  vec3 position{0.0f};
+  vec3 direction{0, 0, -1};  ///< unit, the way that the light travels
+  float inner_cone_rad = 0, outer_cone_rad = kPi / 4;
+  uint32_t node = 0;  ///< index into GltfScene::nodes
+};
+
+/// Keys of one animated property of one node.
+struct GltfChannel {
+  enum class Path { Translation, Rotation, Scale };
+  enum class Interpolation { Linear, Step, CubicSpline };
+  Path path;
+  Interpolation interpolation;
+  std::vector<float> times;  ///< seconds, increasing
+  std::vector<vec4> values;  ///< one per key (xyz, or the quaternion xyzw); three for CubicSpline: in, value, out
+};
+
+/// A node's own transform: translation * rotation * scale, or the matrix when the file gives one.
+struct GltfNode {
+  int32_t parent = -1;  ///< always stands before its children in GltfScene::nodes, or -1
+  dvec3 translation{0.0}, scale{1.0};
+  glm::dvec4 rotation{0, 0, 0, 1};  ///< unit quaternion xyzw
+  glm::dmat4 matrix{1.0};
+  bool has_matrix = false;
+  std::vector<uint32_t> channels;  ///< indices into GltfScene::channels
+};
+
+/// Immutable once read; thread-safe.
+struct GltfScene {
+  std::vector<GltfMesh> meshes;         ///< all of the file, instanced or not
+  std::vector<GltfInstance> instances;  ///< of the default scene, at time 0, in the order of a depth-first walk
+  std::vector<GltfCamera> cameras;      ///< of the default scene, at time 0
+  std::vector<GltfLight> lights;        ///< of the default scene
+  std::vector<GltfNode> nodes;          ///< of the default scene, flattened, parents first
+  std::vector<GltfChannel> channels;
+  double start_seconds = 0, end_seconds = 0;  ///< first and last key of all animation; both 0 when nothing moves
+  double frames_per_second = 24;              ///< of the keys where they are evenly spaced at a usual rate, else 24
+  std::vector<std::string> warnings;          ///< one line each
+
+  /// Camera `index` (< cameras.size()) at a time; times outside the animation's range hold its first or last key.
+  GltfCamera camera_at(size_t index, double seconds) const;
+  /// All instances at a time. An instance whose transform is singular then is left out, as it is at time 0.
+  std::vector<GltfInstance> instances_at(double seconds) const;
+  /// Frame n shows the time n / frames_per_second; frame 0 is time 0, as Blender exports it.
+  double seconds_of_frame(double frame) const { return frame / frames_per_second; }
+  /// World bounds of the instances at time 0, from GltfMesh::bounds. Empty when there are none.
+  Box3 bounds_world() const;
+};
+
+/// Reads the default scene (the first, if none is marked) of a .glb or .gltf, gzipped or not.
+/// Errors: NotFound, Io, BadFile (with node cycles, indices out of range), Unsupported (required extensions that this
+/// version does not know, by name).
+Result<GltfScene> read_gltf_scene(const std::filesystem::path& path);
+
+}  // namespace farfield
