@@ -16,8 +16,6 @@
 
 namespace farfield {
 
-inline constexpr double kFramesPerSecond = 24.0;  ///< frame n is the scene at n / 24 s
-
 /// What render and shot have in common.
 struct RenderOptions {
   std::filesystem::path scene;  ///< .gltf or .glb
@@ -62,7 +60,8 @@ struct RenderReport {
 };
 
 /// Renders one frame to `out` (EXR with all AOVs and metadata) and to the PNG beside it.
-/// frame: n >= 0 is the scene at n / 24 s. Errors: those of the scene, the bake, the runtime, the files; Cancelled.
+/// frame: n is the scene at n / 24 s (or at the frame rate of its animation, see GltfScene::frames_per_second). Errors:
+/// those of the scene, the bake, the runtime, the files; Cancelled.
 Result<RenderReport> render_frame(const RenderOptions& options, int frame, const std::filesystem::path& out);
 
 }  // namespace farfield
