@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: Apache-2.0
+// [Loubet 2018, chapter 7 and appendix A]. The surface is explored from a face outwards through edges that touch the
+// ball. Where it leaves the ball, a triangle cuts the sphere in arcs; their ends lie on edges, and neighbouring
+// triangles share them. So the curve's topology is that of a graph whose nodes are (edge, end) pairs, and whether a
+// node exists is decided once per vertex and edge: neighbours can not disagree, however the numbers round.
+#include "prefilter/macrosurface.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "base/parallel.h"
+#include "prefilter/edge_table.h"
+#include "prefilter/index_map.h"
+
+namespace farfield {
+
+namespace {
+
+/// Faces that one exploration may visit. Patches keep it far below that on all but crumpled surfaces, which are
+/// sub-resolution anyway.
+constexpr size_t kMaxExploredFaces = size_t{1} << 18;
+
+/// One answer serves the faces around a point within this fraction of the resolution.
+constexpr double kPatchRadius = 0.125;
+
+/// Length of a triangle's longest edge over the height on it, above which the middle of that edge represents the
+/// triangle better than its centre of mass (thesis 7.2.2).
+constexpr double kElongated = 2.0;
+
+constexpr int next_corner(int corner) { return corner == 2 ? 0 : corner + 1; }
+
+dvec3 corner_position(const Surface& surface, uint32_t face, int corner) {
+  return dvec3(surface.positions[surface.triangles[face][corner]]);
+}
+
+/// The point that stands for the face.
+dvec3 evaluation_point(const Surface& surface, uint32_t face) {
+  const std::array<dvec3, 3> p = {corner_position(surface, face, 0), corner_position(surface, face, 1),
+                                  corner_position(surface, face, 2)};
+  int longest = 0;
+  double longest2 = -1;
+  for (int c = 0; c < 3; ++c) {
+    const dvec3 edge = p[static_cast<size_t>(next_corner(c))] - p[static_cast<size_t>(c)];
+    if (glm::dot(edge, edge) > longest2) longest2 = glm::dot(edge, edge), longest = c;
+  }
+  const double twice_area = glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
+  const bool is_elongated = longest2 > kElongated * twice_area;
+  if (!is_elongated) return (p[0] + p[1] + p[2]) / 3.0;
+  return 0.5 * (p[static_cast<size_t>(longest)] + p[static_cast<size_t>(next_corner(longest))]);
+}
+
+/// Counts the connected components of a graph while nodes and links arrive.
+class ComponentCounter {
+ public:
+  void clear() {
+    nodes_.clear();
+    parent_.clear();
+    components_ = 0;
+  }
+  void link(uint32_t key_a, uint32_t key_b) {
+    const uint32_t a = root(node(key_a)), b = root(node(key_b));
+    if (a == b) return;
+    parent_[std::max(a, b)] = std::min(a, b);
+    --components_;
+  }
+  int components() const { return components_; }
+
+ private:
+  uint32_t node(uint32_t key) {
+    const auto [index, is_new] = nodes_.insert(key);
+    if (is_new) {
+      parent_.push_back(index);
+      ++components_;
+    }
+    return index;
+  }
+  uint32_t root(uint32_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+
+  IndexMap nodes_;
+  std::vector<uint32_t> parent_;
+  int components_ = 0;
+};
+
+/// Evaluates the criterion of 7.1.2. Keeps its scratch memory between calls; one thread at a time.
+class BallExplorer {
+ public:
+  BallExplorer(const Surface& surface, const EdgeTable& edges, double radius)
+      : surface_(surface), edges_(edges), radius2_(radius * radius) {}
+
+  bool is_on_macrosurface(uint32_t face) {
+    center_ = evaluation_point(surface_, face);
+    if (!touches_edges(face)) return true;  // the curve is a circle within the face
+    curve_.clear();
+    explored_.clear();
+    explored_.insert(face);
+    for (uint32_t i = 0; i < explored_.size(); ++i) {
+      explore(explored_.key(i));
+      if (explored_.size() > kMaxExploredFaces) return false;
+    }
+    return curve_.components() == 1;
+  }
+
+ private:
+  /// Where an edge meets the ball, seen from its smaller to its larger vertex.
+  struct EdgeCut {
+    bool touches = false;  ///< some of it lies inside
+    bool enters = false;   ///< the sphere is crossed from outside to inside: node 2 * edge
+    bool leaves = false;   ///< and from inside to outside: node 2 * edge + 1
+  };
+
+  bool is_inside(uint32_t vertex) const {
+    const dvec3 offset = dvec3(surface_.positions[vertex]) - center_;
+    return glm::dot(offset, offset) <= radius2_;
+  }
+
+  EdgeCut cut(uint32_t edge) const {
+    const uint32_t a = edges_.smaller_vertex[edge], b = edges_.larger_vertex[edge];
+    const bool a_inside = is_inside(a), b_inside = is_inside(b);
+    if (a_inside || b_inside) return {true, !a_inside, !b_inside};
+    const dvec3 origin = dvec3(surface_.positions[a]) - center_;
+    const dvec3 direction = dvec3(surface_.positions[b]) - dvec3(surface_.positions[a]);
+    const double length2 = glm::dot(direction, direction);
+    const double along = -glm::dot(origin, direction);
+    if (!(along > 0 && along < length2)) return {};
+    const dvec3 nearest = origin + direction * (along / length2);
+    const bool is_cut = glm::dot(nearest, nearest) < radius2_;
+    return {is_cut, is_cut, is_cut};
+  }
+
+  bool touches_edges(uint32_t face) const {
+    const uvec3& e = edges_.face_edges[face];
+    return cut(e.x).touches || cut(e.y).touches || cut(e.z).touches;
+  }
+
+  /// Adds the face's arcs to the curve, and its neighbours through edges that touch the ball to the exploration.
+  void explore(uint32_t face) {
+    // The part of a triangle inside a ball is convex. So along the triangle's boundary, where it leaves the ball an arc
+    // begins, and that arc ends where the boundary next enters again.
+    struct Crossing {
+      uint32_t node;
+      bool enters;
+    };
+    std::array<Crossing, 6> crossings;
+    size_t count = 0;
+    for (int c = 0; c < 3; ++c) {
+      const uint32_t edge = edges_.face_edges[face][c];
+      const EdgeCut edge_cut = cut(edge);
+      if (!edge_cut.touches) continue;
+      for (const uint32_t neighbour : edges_.faces_of(edge)) explored_.insert(neighbour);
+      const bool forward = surface_.triangles[face][c] == edges_.smaller_vertex[edge];
+      const Crossing at_enter{2 * edge, forward}, at_leave{2 * edge + 1, !forward};
+      if (forward && edge_cut.enters) crossings[count++] = at_enter;
+      if (edge_cut.leaves) crossings[count++] = at_leave;
+      if (!forward && edge_cut.enters) crossings[count++] = at_enter;
+    }
+    for (size_t i = 0; i < count; ++i) {
+      if (!crossings[i].enters) curve_.link(crossings[i].node, crossings[(i + 1) % count].node);
+    }
+  }
+
+  const Surface& surface_;
+  const EdgeTable& edges_;
+  const double radius2_;
+  dvec3 center_{0.0};
+  IndexMap explored_;
+  ComponentCounter curve_;
+};
+
+/// A face that answers for those around it, and which faces those are.
+struct Patches {
+  std::vector<uint32_t> seeds;          ///< per patch
+  std::vector<uint32_t> patch_of_face;  ///< per face
+};
+
+/// Grows connected patches around seeds, in face order. Faces larger than a patch stay alone: the thesis's evaluation.
+Patches make_patches(const Surface& surface, const EdgeTable& edges, double radius) {
+  constexpr uint32_t kNone = 0xffffffffu;
+  Patches patches;
+  patches.patch_of_face.assign(surface.triangles.size(), kNone);
+  std::vector<uint32_t> front;
+  for (uint32_t seed = 0; seed < surface.triangles.size(); ++seed) {
+    if (patches.patch_of_face[seed] != kNone) continue;
+    const uint32_t patch = static_cast<uint32_t>(patches.seeds.size());
+    patches.seeds.push_back(seed);
+    patches.patch_of_face[seed] = patch;
+    const dvec3 center = evaluation_point(surface, seed);
+    const auto is_near = [&](uint32_t face) {
+      for (int c = 0; c < 3; ++c) {
+        const dvec3 offset = corner_position(surface, face, c) - center;
+        if (!(glm::dot(offset, offset) <= radius * radius)) return false;
+      }
+      return true;
+    };
+    front.assign(1, seed);
+    while (!front.empty()) {
+      const uint32_t face = front.back();
+      front.pop_back();
+      for (int c = 0; c < 3; ++c) {
+        for (const uint32_t neighbour : edges.faces_of(edges.face_edges[face][c])) {
+          if (patches.patch_of_face[neighbour] != kNone || !is_near(neighbour)) continue;
+          patches.patch_of_face[neighbour] = patch;
+          front.push_back(neighbour);
+        }
+      }
+    }
+  }
+  return patches;
+}
+
+/// A set of faces that are connected through edges and have the same class.
+struct Piece {
+  uint8_t is_macrosurface;
+  std::vector<uint32_t> faces;
+};
+
+std::vector<Piece> connected_pieces(const EdgeTable& edges, const std::vector<uint8_t>& is_macrosurface) {
+  std::vector<Piece> pieces;
+  std::vector<uint8_t> is_taken(is_macrosurface.size(), 0);
+  for (uint32_t first = 0; first < is_macrosurface.size(); ++first) {
+    if (is_taken[first]) continue;
+    is_taken[first] = 1;
+    Piece piece{is_macrosurface[first], {first}};
+    for (size_t i = 0; i < piece.faces.size(); ++i) {
+      const uvec3 face_edges = edges.face_edges[piece.faces[i]];
+      for (int c = 0; c < 3; ++c) {
+        for (const uint32_t neighbour : edges.faces_of(face_edges[c])) {
+          if (is_taken[neighbour] || is_macrosurface[neighbour] != piece.is_macrosurface) continue;
+          is_taken[neighbour] = 1;
+          piece.faces.push_back(neighbour);
+        }
+      }
+    }
+    pieces.push_back(std::move(piece));
+  }
+  return pieces;
+}
+
+/// Whether all the faces fit into a ball of that radius. Walks towards the smallest ball [Badoiu and Clarkson 2003]:
+/// the answer is exact but for sizes within about 2 % of the radius.
+bool fits_into_ball(const Surface& surface, const std::vector<uint32_t>& faces, double radius) {
+  constexpr int kSteps = 64;
+  Box3 box;
+  for (const uint32_t face : faces) {
+    for (int c = 0; c < 3; ++c) box.extend(surface.positions[surface.triangles[face][c]]);
+  }
+  const dvec3 size(box.size());
+  if (!(0.5 * std::max(size.x, std::max(size.y, size.z)) <= radius)) return false;
+  if (0.5 * glm::length(size) <= radius) return true;
+  dvec3 center(box.center());
+  for (int step = 0; step < kSteps; ++step) {
+    dvec3 farthest = center;
+    double farthest2 = 0;
+    for (const uint32_t face : faces) {
+      for (int c = 0; c < 3; ++c) {
+        const dvec3 p = corner_position(surface, face, c);
+        const double distance2 = glm::dot(p - center, p - center);
+        if (distance2 > farthest2) farthest2 = distance2, farthest = p;
+      }
+    }
+    if (farthest2 <= radius * radius) return true;
+    center += (farthest - center) / (step + 2.0);
+  }
+  return false;
+}
+
+/// How much of the piece's outline borders on the other class rather than on nothing, in [0, 1]; 0 without outline.
+double surrounded_part(const Surface& surface, const EdgeTable& edges, const std::vector<uint8_t>& is_macrosurface,
+                       const Piece& piece) {
+  double outline = 0, surrounded = 0;
+  for (const uint32_t face : piece.faces) {
+    for (int c = 0; c < 3; ++c) {
+      const auto neighbours = edges.faces_of(edges.face_edges[face][c]);
+      const bool meets_other = std::any_of(neighbours.begin(), neighbours.end(), [&](uint32_t neighbour) {
+        return is_macrosurface[neighbour] != piece.is_macrosurface;
+      });
+      if (!meets_other && neighbours.size() != 1) continue;
+      const double length =
+          glm::length(corner_position(surface, face, next_corner(c)) - corner_position(surface, face, c));
+      outline += length;
+      if (meets_other) surrounded += length;
+    }
+  }
+  return outline > 0 ? surrounded / outline : 0.0;
+}
+
+/// Pieces of macrosurface that do not cover a pixel become sub-resolution (7.2.2).
+void drop_small_pieces(const Surface& surface, const EdgeTable& edges, double resolution,
+                       std::vector<uint8_t>& is_macrosurface) {
+  for (const Piece& piece : connected_pieces(edges, is_macrosurface)) {
+    if (!piece.is_macrosurface || !fits_into_ball(surface, piece.faces, resolution)) continue;
+    for (const uint32_t face : piece.faces) is_macrosurface[face] = 0;
+  }
+}
+
+/// Small sub-resolution islands in macrosurfaces join them (7.3): seams cost more than they bring.
+void fill_small_islands(const Surface& surface, const EdgeTable& edges, double resolution,
+                        std::vector<uint8_t>& is_macrosurface) {
+  constexpr double kMostly = 0.5;
+  const std::vector<uint8_t> before = is_macrosurface;
+  for (const Piece& piece : connected_pieces(edges, before)) {
+    if (piece.is_macrosurface || surrounded_part(surface, edges, before, piece) < kMostly) continue;
+    if (!fits_into_ball(surface, piece.faces, resolution)) continue;
+    for (const uint32_t face : piece.faces) is_macrosurface[face] = 1;
+  }
+}
+
+}  // namespace
+
+std::vector<uint8_t> classify_macrosurface(const Surface& surface, float resolution) {
+  if (!(resolution > 0)) return std::vector<uint8_t>(surface.triangles.size(), 1);
+  const EdgeTable edges = build_edge_table(surface.triangles, surface.positions.size());
+  const Patches patches = make_patches(surface, edges, kPatchRadius * resolution);
+
+  std::vector<uint8_t> patch_is_macrosurface(patches.seeds.size());
+  parallel_for(patches.seeds.size(), 256, [&](size_t begin, size_t end) {
+    BallExplorer explorer(surface, edges, resolution);
+    for (size_t i = begin; i < end; ++i) patch_is_macrosurface[i] = explorer.is_on_macrosurface(patches.seeds[i]);
+  });
+
+  std::vector<uint8_t> is_macrosurface(surface.triangles.size());
+  for (size_t face = 0; face < is_macrosurface.size(); ++face) {
+    is_macrosurface[face] = patch_is_macrosurface[patches.patch_of_face[face]];
+  }
+  drop_small_pieces(surface, edges, resolution, is_macrosurface);
+  fill_small_islands(surface, edges, resolution, is_macrosurface);
+  return is_macrosurface;
+}
+
+}  // namespace farfield

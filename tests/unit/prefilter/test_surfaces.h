@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// Surfaces of known shape for the tests of the bake.
+#pragma once
+
+#include <cmath>
+#include <functional>
+
+#include "base/vec.h"
+#include "prefilter/surface.h"
+
+namespace farfield::test {
+
+/// Gives every face a plain material, with the geometric normal's SGGX matrix.
+inline void add_materials(Surface& surface) {
+  surface.materials.clear();
+  for (const uvec3& t : surface.triangles) {
+    const dvec3 a(surface.positions[t.x]), b(surface.positions[t.y]), c(surface.positions[t.z]);
+    const dvec3 n = glm::cross(b - a, c - a);
+    FaceMaterial material;
+    material.sggx = glm::length(n) > 0 ? SymMat3::outer(vec3(glm::normalize(n))) : SymMat3::identity();
+    material.diffuse = vec3(0.5f);
+    surface.materials.push_back(material);
+  }
+}
+
+/// A grid of nu x nv quads, two triangles each, at point(u, v), u and v in [0, 1]; optionally closed in u.
+inline Surface make_grid(int nu, int nv, bool closed_u, const std::function<vec3(float, float)>& point) {
+  Surface surface;
+  const int columns = closed_u ? nu : nu + 1;
+  for (int j = 0; j <= nv; ++j) {
+    for (int i = 0; i < columns; ++i) {
+      surface.positions.push_back(
+          point(static_cast<float>(i) / static_cast<float>(nu), static_cast<float>(j) / static_cast<float>(nv)));
+    }
+  }
+  const auto vertex = [&](int i, int j) { return static_cast<uint32_t>(j * columns + i % columns); };
+  for (int j = 0; j < nv; ++j) {
+    for (int i = 0; i < nu; ++i) {
+      surface.triangles.emplace_back(vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1));
+      surface.triangles.emplace_back(vertex(i, j), vertex(i + 1, j + 1), vertex(i, j + 1));
+    }
+  }
+  add_materials(surface);
+  return surface;
+}
+
+/// [0, width] x [0, height] in the plane z = 0.
+inline Surface make_plane(int nu, int nv, float width, float height) {
+  return make_grid(nu, nv, false, [=](float u, float v) { return vec3(u * width, v * height, 0.0f); });
+}
+
+/// An open tube along z.
+inline Surface make_tube(int around, int along, float radius, float length) {
+  return make_grid(around, along, true, [=](float u, float v) {
+    return vec3(radius * std::cos(2 * kPi * u), radius * std::sin(2 * kPi * u), length * v);
+  });
+}
+
+/// A closed sphere around the origin: latitude rings and two poles.
+inline Surface make_sphere(int around, int rings, float radius) {
+  Surface surface;
+  for (int j = 1; j < rings; ++j) {
+    const float theta = kPi * static_cast<float>(j) / static_cast<float>(rings);
+    for (int i = 0; i < around; ++i) {
+      const float phi = 2 * kPi * static_cast<float>(i) / static_cast<float>(around);
+      surface.positions.push_back(
+          radius * vec3(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)));
+    }
+  }
+  const uint32_t north = static_cast<uint32_t>(surface.positions.size()), south = north + 1;
+  surface.positions.emplace_back(0.0f, 0.0f, radius);
+  surface.positions.emplace_back(0.0f, 0.0f, -radius);
+  const auto vertex = [&](int i, int j) { return static_cast<uint32_t>((j - 1) * around + i % around); };
+  for (int i = 0; i < around; ++i) {
+    surface.triangles.emplace_back(north, vertex(i, 1), vertex(i + 1, 1));
+    for (int j = 1; j + 1 < rings; ++j) {
+      surface.triangles.emplace_back(vertex(i, j), vertex(i, j + 1), vertex(i + 1, j + 1));
+      surface.triangles.emplace_back(vertex(i, j), vertex(i + 1, j + 1), vertex(i + 1, j));
+    }
+    surface.triangles.emplace_back(vertex(i, rings - 1), south, vertex(i + 1, rings - 1));
+  }
+  add_materials(surface);
+  return surface;
+}
+
+/// Both surfaces in one.
+inline Surface join(Surface a, const Surface& b) {
+  const uint32_t offset = static_cast<uint32_t>(a.positions.size());
+  a.positions.insert(a.positions.end(), b.positions.begin(), b.positions.end());
+  for (const uvec3& t : b.triangles) a.triangles.push_back(t + uvec3(offset));
+  a.materials.insert(a.materials.end(), b.materials.begin(), b.materials.end());
+  return a;
+}
+
+inline double total_area(const Surface& surface) {
+  double area = 0;
+  for (const uvec3& t : surface.triangles) {
+    const dvec3 a(surface.positions[t.x]), b(surface.positions[t.y]), c(surface.positions[t.z]);
+    area += 0.5 * glm::length(glm::cross(b - a, c - a));
+  }
+  return area;
+}
+
+}  // namespace farfield::test
