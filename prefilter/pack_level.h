@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// From what the bake computes with (full precision, any order) to what a level file holds (cache/level.h).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "cache/level.h"
+#include "prefilter/surface.h"
+#include "prefilter/voxelize.h"
+
+namespace farfield {
+
+inline constexpr uint32_t kUnused = 0xffffffffu;  ///< a vertex that no triangle uses
+
+/// The final numbering of a surface: triangles paired into quads, quads along a Morton curve, faces in the order of the
+/// quads, vertices in the order of their first use.
+struct SurfaceOrder {
+  std::vector<Quad> quads;              ///< in final vertex numbers
+  std::vector<uint32_t> vertex_number;  ///< for each vertex of the surface: its final number or kUnused
+  std::vector<uint32_t> face_number;    ///< for each triangle: its final number
+};
+
+/// Pairs and orders. Two triangles become a quad when they share an edge and have the same winding; their shared edge
+/// is the quad's diagonal v1-v3, so that the quad is exactly the two triangles. Depends only on the surface.
+SurfaceOrder order_surface(const Surface& surface);
+
+/// The surface with vertices (without unused ones) and triangles in their final order. Corners of a triangle may be
+/// rotated: face 0 of a quad is (v0, v1, v3), face 1 is (v2, v3, v1).
+Surface reorder(const Surface& surface, const SurfaceOrder& order);
+
+/// Maps from the previous stored level, in final numbers of both.
+struct MorphMaps {
+  std::vector<uint32_t> vertex;  ///< as LevelArrays::morph_vertex
+  std::vector<uint32_t> face;    ///< as LevelArrays::morph_face
+};
+
+/// Packs one level. `surface` is in final order (the result of reorder with `order`). A channel whose values are all
+/// the default is left out. header.bounds covers the surface and all active voxels.
+LevelData pack_level(uint32_t level, double resolution, const Surface& surface, const SurfaceOrder& order,
+                     const SparseVolume& volume, MorphMaps morph);
+
+}  // namespace farfield
