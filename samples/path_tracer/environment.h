@@ -7,6 +7,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "base/random.h"
 #include "base/result.h"
@@ -15,6 +16,9 @@
 
 namespace farfield {
 
+/// Luminance of linear RGB with Rec. 709 primaries.
+inline float luminance(const vec3& rgb) { return 0.2126f * rgb.x + 0.7152f * rgb.y + 0.0722f * rgb.z; }
+
 /// One direction drawn from where light comes from. A zero pdf is a failed sample.
 struct EnvironmentSample {
   vec3 wi{0.0f};        ///< unit, towards the light
@@ -22,14 +26,14 @@ struct EnvironmentSample {
   float pdf = 0;        ///< per steradian
 };
 
-/// A clear sky [Preetham et al. 1999] with a sun disc; below the horizon a grey ground, lit by both.
+/// A clear sky [Preetham et al. 1999] with a sun disc; below the horizon a grey ground, lit by both. How bright the sky
+/// is against the sun follows the model.
 struct SunSkyOptions {
   vec3 sun_direction{0.0f, 1.0f, 0.0f};  ///< towards the sun, need not be unit
-  float turbidity = 3.0f;                ///< haze: 2 very clear .. 10 hazy; clamped to [1.7, 10]
-  float sun_irradiance =
-      4.5f;             ///< luminance of the sun's light on a surface that faces it, W / m^2; scales sun and sky
-  vec3 sun_tint{1.0f};  ///< multiplies the sun disc alone (a light's colour), the sky stays as it is
-  float sun_angle_rad = 0.0093f;  ///< diameter of the disc; clamped to [1e-4, 1]
+  float sun_irradiance = 4.5f;           ///< luminance of the sun's light on a surface that faces it, W / m^2, >= 0
+  std::optional<vec3> sun_color;         ///< of the disc, any scale; absent: as the air tints it
+  float sun_angle_rad = 0.0093f;         ///< diameter of the disc; clamped to [1e-3, 1]
+  float turbidity = 3.0f;                ///< haze: 2 very clear, 10 hazy; clamped to [1.7, 10]
   float ground_albedo = 0.2f;
 };
 
@@ -37,11 +41,12 @@ struct SunSkyOptions {
 class Environment {
  public:
   static Environment constant(const vec3& radiance);
-  /// A sun below the horizon gives the sky of a sun at the horizon and no disc.
+  /// A sun below the horizon gives the sky of a sun at the horizon and no disc. A direction of length 0 or NaN counts
+  /// as straight up.
   static Environment sun_sky(const SunSkyOptions& options);
   /// image: 3 or more channels R, G, B first, latitude-longitude: the upper row is +y, the centre of the image -z, and
-  /// x grows from -z to +x (glTF's camera looks at the image's centre). Negative and NaN texels count as 0.
-  /// scale multiplies the radiance. Errors: InvalidArgument (no texels, less than 3 channels).
+  /// x grows from -z towards +x (a glTF camera looks at the image's centre). Texels are constant patches. Negative and
+  /// NaN texels count as 0. scale multiplies the radiance. Errors: InvalidArgument (no texels, less than 3 channels).
   static Result<Environment> from_image(const Image& image, float scale = 1.0f);
   /// Reads an EXR file and makes an environment of it. Errors: those of read_exr and from_image.
   static Result<Environment> from_exr(const std::filesystem::path& path, float scale = 1.0f);

@@ -16,6 +16,22 @@ struct FilmSample {
   float lod_volume = 0;  ///< 1: hit a voxel, 0: a mesh
 };
 
+/// Sums over a pixel's samples, in double: a million samples are as exact as ten. A value.
+class PixelSums {
+ public:
+  void add(const FilmSample& sample);
+
+ private:
+  friend class Film;
+  struct Part {
+    glm::dvec4 rgba{0.0};
+    double count = 0;
+  };
+  Part halves_[2];  // samples with even and with odd index
+  glm::dvec4 lod_{0.0};
+  double hits_ = 0;
+};
+
 /// The film. set_pixel() may be called from several threads for different pixels. Memory is allocated and touched by
 /// the constructor; nothing more is needed later.
 class Film {
@@ -29,8 +45,7 @@ class Film {
   int height() const { return image_.height; }
   bool has_half_buffers() const { return !halves_[0].values.empty(); }
 
-  /// samples: of this pixel, in order.
-  void set_pixel(int x, int y, std::span<const FilmSample> samples);
+  void set_pixel(int x, int y, const PixelSums& sums);
 
   const Image& image() const { return image_; }
   /// R, G, B, A means of the samples with even (0) or odd (1) index. Only with half_buffers.

@@ -2,6 +2,7 @@
 // Float images in memory and in files: OpenEXR with any channels and metadata, PNG previews, contact sheets.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <span>
@@ -31,6 +32,9 @@ struct Image {
   int find_channel(const std::string& name) const;
 };
 
+/// Indices of R, G and B, -1 where missing; an image without any of them is grey: its first channel three times.
+std::array<int, 3> rgb_channels(const Image& image);
+
 using MetadataValue = std::variant<int, float, vec3, std::string>;
 /// Named values in a file's header, next to what the format itself puts there.
 using Metadata = std::map<std::string, MetadataValue>;
@@ -46,19 +50,35 @@ struct ExrFile {
 /// Reads a scanline or tiled, single-part EXR file. Errors: NotFound, BadFile, Unsupported (deep data).
 Result<ExrFile> read_exr(const std::filesystem::path& path);
 
-/// Linear RGB to 8-bit sRGB: scaled by 2^exposure_stops, then clipped [IEC 61966-2-1]. Alpha is kept when there is one.
 struct PngOptions {
-  float exposure_stops = 0;
+  float exposure_stops = 0;  ///< RGB is multiplied by 2^exposure_stops
 };
-/// Writes the first three channels (or one, as grey), and A if there is one, to a temporary name that is then renamed.
-/// Errors: Io, InvalidArgument.
+/// Writes R, G, B (or the one channel, as grey) as 8-bit sRGB [IEC 61966-2-1], clipped to [0, 1], NaN as 0, without
+/// alpha, to a temporary name that is then renamed. Errors: Io, InvalidArgument (empty image).
 Result<void> write_png(const std::filesystem::path& path, const Image& image, const PngOptions& options = {});
 
-/// Lays images out in rows of `columns`, row by row, `gap` pixels apart on black; cells are as large as the largest.
-/// Missing channels are black, alpha is composited over mid-grey. The result has R, G, B.
-Image contact_sheet(std::span<const Image> images, int columns, int gap = 2);
+/// The named channels alone, in this order; those that the image lacks are 0.
+Image select_channels(const Image& image, const std::vector<std::string>& names);
 
-/// The image at 1/n of its size by averaging n x n pixels (the last row and column of blocks may be partial). n >= 1.
+/// R, G, B of a premultiplied image over a colour: rgb + (1 - A) color. Without A the image as it is.
+Image composite_over(const Image& image, const vec3& color);
+
+/// The image at 1/n of its size by averaging n x n pixels; blocks at the right and lower edge may be partial. n >= 1.
 Image downsample(const Image& image, int n);
+
+/// Pictures in rows on one black sheet. All memory is allocated and touched by the constructor.
+class ContactSheet {
+ public:
+  /// Cells of cell_width x cell_height pixels in rows of `columns`, `gap` pixels apart. All >= 1, gap >= 0.
+  ContactSheet(int count, int columns, int cell_width, int cell_height, int gap = 2);
+
+  /// Puts R, G, B of an image into a cell (row by row), averaged down by the smallest whole factor that makes it fit.
+  void set(int cell, const Image& image);
+  const Image& image() const { return sheet_; }
+
+ private:
+  int columns_, cell_width_, cell_height_, gap_;
+  Image sheet_;
+};
 
 }  // namespace farfield

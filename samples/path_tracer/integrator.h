@@ -26,6 +26,9 @@ struct PointLight {
   float cos_outer = -1;         ///< none outside
 };
 
+/// How much of its intensity a light sends into a unit direction that leaves it, in [0, 1].
+float spot_falloff(const PointLight& light, const vec3& direction);
+
 struct Lights {
   Environment environment = Environment::constant(vec3(0.0f));
   std::vector<PointLight> points;
@@ -55,11 +58,17 @@ struct TraceOptions {
   LightStrategy strategy = LightStrategy::Mis;
 };
 
+struct TraceStats {
+  uint64_t rays = 0;             ///< camera, scattered and shadow rays
+  uint64_t invalid_samples = 0;  ///< paths whose value was not finite; they count as black
+};
+
 /// Renders `camera` into `film` (same size) on all threads of parallel_for. The image depends on the arguments alone,
-/// not on threads or time. progress (may be empty) is called from one thread at a time with the fraction done in
-/// [0, 1]; cancel (may be null) is polled for each tile. Errors: Cancelled; InvalidArgument (sizes differ, no samples).
-Result<void> path_trace(const TraceScene& scene, const Camera& camera, const TraceOptions& options, Film& film,
-                        const std::function<void(double done)>& progress = {},
-                        const std::atomic<bool>* cancel = nullptr);
+/// not on threads or time. progress (may be empty) is called with the fraction done, in (0, 1], from several threads at
+/// once; cancel (may be null) is polled for each tile of 16 x 16 pixels. Errors: Cancelled (the film is part done);
+/// InvalidArgument (sizes differ, no samples).
+Result<TraceStats> path_trace(const TraceScene& scene, const Camera& camera, const TraceOptions& options, Film& film,
+                              const std::function<void(double done)>& progress = {},
+                              const std::atomic<bool>* cancel = nullptr);
 
 }  // namespace farfield

@@ -33,7 +33,7 @@ struct RenderOptions {
   uint32_t finest_grid = 512;         ///< of assets that have to be baked first
   /// Command that bakes: called as BAKER bake SCENE -o DIR --mesh N ... Empty: this very program.
   std::filesystem::path baker;
-  /// Messages for a person, one line each, and how far the whole job is. May be empty.
+  /// Messages for a person, one line each, and how far the whole job is; from any thread. May be empty.
   std::function<void(const std::string& line)> message;
   std::function<void(double done, const std::string& what)> progress;
   const std::atomic<bool>* cancel = nullptr;

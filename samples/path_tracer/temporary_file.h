@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// Files that appear whole or not at all.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "base/result.h"
+
+namespace farfield {
+
+/// A name beside `target` to write to; commit() renames it to the target, otherwise the destructor removes it.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(std::filesystem::path target);
+  ~TemporaryFile();
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  /// Errors: Io.
+  Result<void> commit();
+
+ private:
+  std::filesystem::path target_;
+  std::filesystem::path path_;
+};
+
+/// Writes text to a file through a TemporaryFile. Errors: Io.
+Result<void> write_text_file(const std::filesystem::path& path, const std::string& text);
+
+}  // namespace farfield
