@@ -36,6 +36,8 @@ void parallel_for(size_t count, size_t grain, const std::function<void(size_t, s
   for (std::thread& thread : threads) thread.join();
 }
 
+void run_isolated(const std::function<void()>& body) { body(); }
+
 #else
 
 void parallel_for(size_t count, size_t grain, const std::function<void(size_t, size_t)>& body) {
@@ -45,6 +47,8 @@ void parallel_for(size_t count, size_t grain, const std::function<void(size_t, s
       size_t{0}, ranges, [&](size_t range) { body(range * grain, std::min((range + 1) * grain, count)); },
       tbb::simple_partitioner());
 }
+
+void run_isolated(const std::function<void()>& body) { tbb::this_task_arena::isolate(body); }
 
 #endif
 

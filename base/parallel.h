@@ -13,6 +13,11 @@ namespace farfield {
 /// The body must not throw.
 void parallel_for(size_t count, size_t grain, const std::function<void(size_t begin, size_t end)>& body);
 
+/// Calls body() so that whoever waits inside it (for its own parallel_for, for an Embree build) takes up only tasks
+/// that belong to it meanwhile, not others of the caller's. For work that other tasks wait for. The body must not
+/// throw.
+void run_isolated(const std::function<void()>& body);
+
 /// Limits parallel_for to `threads` (0: as many as the machine has) while alive. One at a time, from the main thread.
 class ThreadLimit {
  public:

@@ -95,7 +95,7 @@ struct LevelArrays {
   Array<uint8_t> voxel_roughness2;
   Array<PackedColor> voxel_transmission;
   Array<uint8_t> voxel_self_shadowing;  ///< unorm8 of A in (0, 1] (thesis 12.2); absent: 1
-  // Morph map from level k-1
+  // Morph map from the next finer stored level, here called k-1
   Array<uint32_t> morph_vertex;  ///< for each vertex of level k-1: vertex of this level, or kMorphVoxelized
   Array<uint32_t> morph_face;    ///< for each face of level k-1: face of this level, kMorphCollapsed or kMorphVoxelized
 

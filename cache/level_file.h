@@ -12,8 +12,17 @@
 namespace farfield {
 
 /// Writes `level` to `path`: to a temporary name beside it, synced, then renamed, so that the file is whole or absent.
-/// The bytes depend only on the level. Returns the file's size. Errors: Io (naming the path and the system's words).
+/// The bytes depend only on the level. Returns the file's size. Errors: Io (naming the path and the system's words),
+/// InvalidArgument (a level that open() would refuse).
 Result<uint64_t> write_level(const std::filesystem::path& path, const LevelData& level);
+
+/// What a level takes on disk and in memory, exact, before it is written.
+struct LevelFileSizes {
+  uint64_t file_bytes = 0;
+  uint64_t mapped_bytes = 0;      ///< file_bytes rounded up to pages: resident once every byte was touched
+  uint64_t build_only_bytes = 0;  ///< of those, what LevelFile::release_build_pages() gives back
+};
+LevelFileSizes level_file_sizes(const LevelView& level);
 
 /// How much of a level file open() proves before it trusts it.
 enum class LevelCheck {
@@ -32,14 +41,14 @@ class LevelFile {
 
   const LevelView& view() const { return view_; }
   uint64_t file_bytes() const { return map_bytes_; }
-  /// Bytes of the sections that only a BVH build reads (positions, quads): see release_build_pages().
+  /// Bytes of the whole pages that hold only positions and quads, which only a BVH build reads.
   uint64_t build_only_bytes() const;
-  /// Gives the pages of positions and quads back to the system; they return from disk if touched again.
+  /// Gives those pages back to the system; they return from disk if touched again. Any thread.
   void release_build_pages() const;
 
  private:
   LevelFile() = default;
-  const std::byte* map_ = nullptr;
+  const std::byte* map_ = nullptr;  ///< file_bytes() long; owned
   uint64_t map_bytes_ = 0;
   LevelView view_;
 };

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/result.h"
@@ -14,6 +15,7 @@
 namespace farfield {
 
 inline constexpr int kFormatVersion = 1;
+inline constexpr const char* kManifestName = "manifest.json";
 
 /// Errors of a level as DESIGN defines them, signed fractions; absent until `farfield evaluate` has run.
 struct LevelErrors {
@@ -54,10 +56,16 @@ struct Manifest {
 };
 
 /// Reads DIR/manifest.json. Untrusted: sizes, ranges and names are checked (a level's file may not leave the folder).
+/// Every byte size is at most 2^50, so that sums over assets cannot overflow.
 /// Errors: NotFound, Io, BadFile, Unsupported (newer format version).
 Result<Manifest> read_manifest(const std::filesystem::path& asset_dir);
 
-/// Writes DIR/manifest.json atomically (temporary name, sync, rename). Errors: Io.
+/// Writes DIR/manifest.json atomically (temporary name, sync, rename). Errors: Io, InvalidArgument (a manifest that
+/// read_manifest() would refuse).
 Result<void> write_manifest(const std::filesystem::path& asset_dir, const Manifest& manifest);
+
+/// The same without files: the text of a manifest, and the manifest of a text. name: for messages.
+std::string manifest_to_json(const Manifest& manifest);
+Result<Manifest> manifest_from_json(std::string_view text, std::string_view name);
 
 }  // namespace farfield

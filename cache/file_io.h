@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// The few things this room asks of the file system: whole-or-absent writes, and reads that only regular files get.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "base/result.h"
+
+namespace farfield {
+
+/// Writes the concatenated pieces to `path`: to a temporary name in the same folder, synced, renamed, the folder
+/// synced. After an error nothing of it is left and what was at `path` before is untouched. Any thread; two writers of
+/// one path do not disturb each other, the last rename wins. Errors: Io, naming the path, the system's words, a remedy.
+Result<void> write_file_atomically(const std::filesystem::path& path,
+                                   std::span<const std::span<const std::byte>> pieces);
+
+/// An open file descriptor, closed at the end.
+class FileDescriptor {
+ public:
+  explicit FileDescriptor(int fd) : fd_(fd) {}
+  FileDescriptor(FileDescriptor&& other) noexcept : fd_(other.fd_) { other.fd_ = -1; }
+  FileDescriptor& operator=(FileDescriptor&&) = delete;
+  ~FileDescriptor();
+  int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+struct RegularFile {
+  FileDescriptor descriptor;
+  uint64_t bytes;
+};
+
+/// Opens a regular file for reading. Its name itself must not be a symbolic link: a baked asset is a folder of plain
+/// files, and a link may lead out of it. Never blocks (pipes, devices). Errors: NotFound, Io, BadFile (not a regular
+/// file, a link).
+Result<RegularFile> open_regular_file(const std::filesystem::path& path);
+
+/// Reads a whole regular file of at most `max_bytes`. Errors: those of open_regular_file, BadFile (too large).
+Result<std::string> read_small_file(const std::filesystem::path& path, uint64_t max_bytes);
+
+}  // namespace farfield

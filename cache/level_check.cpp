@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cache/level_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+namespace farfield {
+
+namespace {
+
+using Problem = std::optional<std::string>;
+
+constexpr uint64_t kMaxElements = 0xfffffff0u;  // indices have 32 bits, and the last few values have other meanings
+constexpr int kMaxBrickDim = 1 << 20;           // voxel coordinates stay far inside an int
+
+Problem check_header(const LevelView& level) {
+  const LevelHeader& header = level.header;
+  if (!std::isfinite(header.resolution) || !(header.resolution > 0)) {
+    return fmt::format("the resolution is {}", header.resolution);
+  }
+  if (!is_finite(header.bounds.lower) || !is_finite(header.bounds.upper) || header.bounds.is_empty()) {
+    return "the bounds are empty or not finite";
+  }
+  if (!is_finite(header.volume_origin)) return "the volume's origin is not finite";
+  if (!level.has_surface() && !level.has_volume()) return "it has neither surface nor volume";
+  return {};
+}
+
+/// The arrays of one group are absent or as long as the group.
+struct Group {
+  const char* name;
+  uint64_t length;
+
+  template <typename T>
+  Problem check(const char* array_name, std::span<const T> array) const {
+    if (array.empty() || array.size() == length) return {};
+    return fmt::format("{} has {} elements for {} {}", array_name, array.size(), length, name);
+  }
+};
+
+Problem first_of(std::initializer_list<Problem> problems) {
+  for (const Problem& problem : problems) {
+    if (problem) return problem;
+  }
+  return {};
+}
+
+/// First index i with values[i] >= limit that is not one of the `specials` largest 32-bit values.
+Problem check_indices(const char* name, std::span<const uint32_t> values, uint64_t limit, uint32_t specials) {
+  const auto bad = [&](uint32_t value) { return value >= limit && value <= 0xffffffffu - specials; };
+  const auto found = std::ranges::find_if(values, bad);
+  if (found == values.end()) return {};
+  return fmt::format("{}[{}] is {}, and there are {}", name, found - values.begin(), *found, limit);
+}
+
+// ---- surface ----
+
+Problem check_quads(const LevelView& level) {
+  if (level.positions.size() > kMaxElements || level.quads.size() > kMaxElements / 2) return "it has too many quads";
+  const auto vertex_count = static_cast<uint32_t>(level.positions.size());
+  const auto bad = [&](const Quad& quad) {
+    return std::max(std::max(quad.v0, quad.v1), std::max(quad.v2, quad.v3)) >= vertex_count;
+  };
+  const auto found = std::ranges::find_if(level.quads, bad);
+  if (found == level.quads.end()) return {};
+  return fmt::format("quads[{}] = ({}, {}, {}, {}), and there are {} vertices", found - level.quads.begin(), found->v0,
+                     found->v1, found->v2, found->v3, vertex_count);
+}
+
+/// Faces are numbered along the quads, without gaps.
+Problem check_face_numbers(const LevelView& level) {
+  if (level.quad_first_face.size() != level.quads.size()) {
+    return fmt::format("quad_first_face has {} elements for {} quads", level.quad_first_face.size(),
+                       level.quads.size());
+  }
+  uint32_t face = 0;
+  for (size_t i = 0; i < level.quads.size(); ++i) {
+    if (level.quad_first_face[i] != face) {
+      return fmt::format("quad_first_face[{}] is {}, expected {}", i, level.quad_first_face[i], face);
+    }
+    face += level.quads[i].is_pair() ? 2 : 1;
+  }
+  return {};
+}
+
+Problem check_surface(const LevelView& level) {
+  if (Problem problem = check_quads(level)) return problem;
+  if (Problem problem = check_face_numbers(level)) return problem;
+  if (level.face_specular.size() != level.face_roughness2.size()) {
+    return "face_specular and face_roughness2 do not go together";
+  }
+  const Group faces{"faces", face_count(level)};
+  return first_of({faces.check("face_sggx", level.face_sggx), faces.check("face_diffuse", level.face_diffuse),
+                   faces.check("face_specular", level.face_specular),
+                   faces.check("face_transmission", level.face_transmission)});
+}
+
+// ---- volume ----
+
+/// The dimensions are what the table says, and 0 without a volume.
+Problem check_brick_dims(const LevelView& level) {
+  const ivec3 dims = level.header.brick_dims;
+  const bool has_volume = level.has_volume();
+  uint64_t cells = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (dims[axis] < 0 || dims[axis] > kMaxBrickDim || (dims[axis] > 0) != has_volume) {
+      return fmt::format("brick_dims are {} x {} x {} with {} bricks", dims.x, dims.y, dims.z, level.bricks.size());
+    }
+    cells *= static_cast<uint64_t>(dims[axis]);  // at most 2^60
+  }
+  if (cells == level.brick_table.size()) return {};
+  return fmt::format("brick_table has {} elements for {} x {} x {} bricks", level.brick_table.size(), dims.x, dims.y,
+                     dims.z);
+}
+
+/// Each brick is in the table once, in the table's order.
+Problem check_brick_table(const LevelView& level) {
+  uint32_t next = 0;
+  for (size_t i = 0; i < level.brick_table.size(); ++i) {
+    const uint32_t entry = level.brick_table[i];
+    if (entry == kNoBrick) continue;
+    if (entry != next || entry >= level.bricks.size()) {
+      return fmt::format("brick_table[{}] is {}, expected {} of {} bricks", i, entry, next, level.bricks.size());
+    }
+    ++next;
+  }
+  if (next == level.bricks.size()) return {};
+  return fmt::format("brick_table names {} of {} bricks", next, level.bricks.size());
+}
+
+/// Bit i: byte i of `bytes` is not 0, for eight bytes.
+uint64_t nonzero_bytes(const uint8_t* bytes) {
+  uint64_t x;
+  std::memcpy(&x, bytes, sizeof x);
+  constexpr uint64_t kLow7 = 0x7f7f7f7f7f7f7f7full;
+  const uint64_t high_bits = (((x & kLow7) + kLow7) | x) & ~kLow7;  // bit 8i+7: byte i is not 0
+  return ((high_bits >> 7) * 0x0102040810204080ull) >> 56;          // the product moves bit 8i to bit 56+i
+}
+
+uint64_t mask_word(const Brick& brick, size_t word) {
+  uint64_t mask = 0;
+  for (size_t i = 0; i < 8; ++i) mask |= nonzero_bytes(&brick.density[word * 64 + i * 8]) << (8 * i);
+  return mask;
+}
+
+/// Mask and prefix sums are those of the densities, so that payload_index() stays below the brick's voxel count.
+Problem check_brick(const Brick& brick, size_t index, uint64_t payload_base) {
+  if (!std::isfinite(brick.density_scale) || !(brick.density_scale > 0)) {
+    return fmt::format("bricks[{}] has density scale {}", index, brick.density_scale);
+  }
+  if (brick.payload_base != payload_base) {
+    return fmt::format("bricks[{}] has payload base {}, expected {}", index, brick.payload_base, payload_base);
+  }
+  uint32_t voxels = 0;
+  for (size_t word = 0; word < 8; ++word) {
+    if (brick.mask[word] != mask_word(brick, word)) return fmt::format("bricks[{}]: mask and densities differ", index);
+    if (brick.prefix[word] != voxels) {
+      return fmt::format("bricks[{}] has prefix sum {}, expected {}", index, brick.prefix[word], voxels);
+    }
+    voxels += static_cast<uint32_t>(std::popcount(brick.mask[word]));
+  }
+  return {};
+}
+
+Problem check_bricks(const LevelView& level) {
+  uint64_t payload_base = 0;
+  for (size_t i = 0; i < level.bricks.size(); ++i) {
+    const Brick& brick = level.bricks[i];
+    if (Problem problem = check_brick(brick, i, payload_base)) return problem;
+    payload_base += brick.prefix[7] + static_cast<uint64_t>(std::popcount(brick.mask[7]));
+    if (payload_base > kMaxElements) return "it has too many voxels";
+  }
+  return {};
+}
+
+Problem check_volume(const LevelView& level) {
+  if (Problem problem = check_brick_dims(level)) return problem;
+  if (Problem problem = check_brick_table(level)) return problem;
+  if (Problem problem = check_bricks(level)) return problem;
+  if (level.voxel_specular.size() != level.voxel_roughness2.size()) {
+    return "voxel_specular and voxel_roughness2 do not go together";
+  }
+  const Group voxels{"voxels", voxel_count(level)};
+  return first_of({voxels.check("voxel_sggx", level.voxel_sggx), voxels.check("voxel_diffuse", level.voxel_diffuse),
+                   voxels.check("voxel_specular", level.voxel_specular),
+                   voxels.check("voxel_transmission", level.voxel_transmission),
+                   voxels.check("voxel_self_shadowing", level.voxel_self_shadowing)});
+}
+
+// ---- values ----
+
+bool contains(const Box3& box, const vec3& p) {  // false for NaN
+  return p.x >= box.lower.x && p.y >= box.lower.y && p.z >= box.lower.z && p.x <= box.upper.x && p.y <= box.upper.y &&
+         p.z <= box.upper.z;
+}
+
+Problem check_positions(const LevelView& level) {
+  const auto outside = [&](const vec3& p) { return !contains(level.header.bounds, p); };
+  const auto found = std::ranges::find_if(level.positions, outside);
+  if (found == level.positions.end()) return {};
+  return fmt::format("positions[{}] = ({}, {}, {}) is not inside the bounds", found - level.positions.begin(), found->x,
+                     found->y, found->z);
+}
+
+/// The box, in voxels relative to the brick, of its active voxels.
+Box3 active_box(const Brick& brick) {
+  Box3 box;
+  for (int i = 0; i < kBrickVoxels; ++i) {
+    if (brick.density[static_cast<size_t>(i)] == 0) continue;
+    const vec3 lower(static_cast<float>(i % 8), static_cast<float>(i / 8 % 8), static_cast<float>(i / 64));
+    box.extend(lower);
+    box.extend(lower + 1.0f);
+  }
+  return box;
+}
+
+/// Bounds are tight around rounded sums (origin + voxel * resolution), so allow the rounding of those.
+Problem check_voxels_inside(const LevelView& level) {
+  const LevelHeader& header = level.header;
+  const vec3 magnitude = glm::max(glm::abs(header.bounds.lower), glm::abs(header.bounds.upper));
+  const vec3 slack = 1e-3f * header.resolution + 1e-6f * magnitude;
+  const Box3 allowed{header.bounds.lower - slack, header.bounds.upper + slack};
+  for (size_t i = 0; i < level.brick_table.size(); ++i) {
+    if (level.brick_table[i] == kNoBrick) continue;
+    const Box3 active = active_box(level.bricks[level.brick_table[i]]);
+    if (active.is_empty()) continue;
+    const uint64_t dims_x = static_cast<uint64_t>(header.brick_dims.x);
+    const uint64_t dims_y = static_cast<uint64_t>(header.brick_dims.y);
+    const vec3 brick(static_cast<float>(i % dims_x), static_cast<float>(i / dims_x % dims_y),
+                     static_cast<float>(i / (dims_x * dims_y)));
+    const vec3 corner = brick * static_cast<float>(kBrickSide);
+    const vec3 lower = header.volume_origin + (corner + active.lower) * header.resolution;
+    const vec3 upper = header.volume_origin + (corner + active.upper) * header.resolution;
+    if (!contains(allowed, lower) || !contains(allowed, upper)) {
+      return fmt::format("bricks[{}] has voxels outside the bounds", level.brick_table[i]);
+    }
+  }
+  return {};
+}
+
+Problem check_reserved_bytes(const LevelView& level) {
+  for (size_t i = 0; i < level.bricks.size(); ++i) {
+    if (std::ranges::any_of(level.bricks[i].reserved, [](uint8_t byte) { return byte != 0; })) {
+      return fmt::format("bricks[{}]: reserved bytes are not 0", i);
+    }
+  }
+  return {};
+}
+
+Problem check_self_shadowing(const LevelView& level) {
+  const auto found = std::ranges::find(level.voxel_self_shadowing, uint8_t{0});
+  if (found == level.voxel_self_shadowing.end()) return {};
+  return fmt::format("voxel_self_shadowing[{}] is 0", found - level.voxel_self_shadowing.begin());
+}
+
+}  // namespace
+
+Problem find_structure_problem(const LevelView& level) {
+  if (Problem problem = check_header(level)) return problem;
+  if (Problem problem = check_surface(level)) return problem;
+  if (Problem problem = check_volume(level)) return problem;
+  return first_of({check_indices("morph_vertex", level.morph_vertex, level.positions.size(), 1),
+                   check_indices("morph_face", level.morph_face, face_count(level), 2)});
+}
+
+Problem find_value_problem(const LevelView& level) {
+  if (Problem problem = check_positions(level)) return problem;
+  if (Problem problem = check_voxels_inside(level)) return problem;
+  return first_of({check_reserved_bytes(level), check_self_shadowing(level)});
+}
+
+}  // namespace farfield

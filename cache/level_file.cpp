@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cache/level_file.h"
+
+#include <fmt/format.h>
+#include <sys/mman.h>
+
+#include <array>
+#include <cerrno>
+#include <system_error>
+#include <vector>
+
+#include "cache/file_io.h"
+#include "cache/level_check.h"
+#include "cache/level_format.h"
+
+namespace farfield {
+
+namespace {
+
+using Bytes = std::span<const std::byte>;
+
+/// At least what can lie between two sections: the padding after positions and less than 64 bytes of alignment.
+constexpr std::array<std::byte, kSectionAlignment + kPositionsPadding> kZeros{};
+
+std::vector<Bytes> section_bytes(const LevelView& level) {
+  std::vector<Bytes> sections;
+  for_each_section(level, [&](SectionId, const auto& array) {
+    if (!array.empty()) sections.push_back(std::as_bytes(array));
+  });
+  return sections;
+}
+
+/// A range of a file, in bytes.
+struct FileRange {
+  uint64_t begin = 0;
+  uint64_t end = 0;
+};
+
+/// The whole pages inside the positions and the quads, which lie one after the other.
+FileRange build_only_pages(const LevelLayout& layout) {
+  FileRange range;
+  for (const SectionEntry& section : layout.sections) {
+    const auto id = static_cast<SectionId>(section.id);
+    if (id != SectionId::Positions && id != SectionId::Quads) continue;
+    if (range.begin == 0) range.begin = section.offset;
+    range.end = section.offset + section.bytes;
+  }
+  range.begin = (range.begin + kPageBytes - 1) / kPageBytes * kPageBytes;
+  range.end = range.end / kPageBytes * kPageBytes;
+  return range.begin < range.end ? range : FileRange{};
+}
+
+}  // namespace
+
+Result<uint64_t> write_level(const std::filesystem::path& path, const LevelData& level) {
+  const LevelView view = view_of(level);
+  auto problem = find_structure_problem(view);
+  if (!problem) problem = find_value_problem(view);
+  if (problem) {
+    return make_error(ErrorCode::InvalidArgument,
+                      fmt::format("cannot write level {} to {}: {}", level.header.level, path.string(), *problem));
+  }
+
+  const LevelLayout layout = layout_of(view);
+  const std::vector<std::byte> head = encode_head(view, layout);
+  const std::vector<Bytes> sections = section_bytes(view);
+  std::vector<Bytes> pieces = {head};
+  uint64_t end = head.size();
+  for (size_t i = 0; i < sections.size(); ++i) {
+    pieces.push_back(Bytes(kZeros).first(layout.sections[i].offset - end));
+    pieces.push_back(sections[i]);
+    end = layout.sections[i].offset + sections[i].size();
+  }
+  pieces.push_back(Bytes(kZeros).first(layout.file_bytes - end));
+
+  if (const Result<void> written = write_file_atomically(path, pieces); !written) {
+    return tl::unexpected(written.error());
+  }
+  return layout.file_bytes;
+}
+
+LevelFileSizes level_file_sizes(const LevelView& level) {
+  const LevelLayout layout = layout_of(level);
+  const FileRange build_only = build_only_pages(layout);
+  return {layout.file_bytes, (layout.file_bytes + kPageBytes - 1) / kPageBytes * kPageBytes,
+          build_only.end - build_only.begin};
+}
+
+Result<std::unique_ptr<LevelFile>> LevelFile::open(const std::filesystem::path& path, LevelCheck check) {
+  const Result<RegularFile> file = open_regular_file(path);
+  if (!file) return tl::unexpected(file.error());
+  if (file->bytes == 0) {
+    return make_error(ErrorCode::BadFile,
+                      fmt::format("broken level file {}: it is empty; bake the asset again", path.string()));
+  }
+  void* map = ::mmap(nullptr, file->bytes, PROT_READ, MAP_PRIVATE, file->descriptor.get(), 0);
+  if (map == MAP_FAILED) {
+    return make_error(ErrorCode::Io, fmt::format("cannot map {}: {}", path.string(),
+                                                 std::error_code(errno, std::generic_category()).message()));
+  }
+  std::unique_ptr<LevelFile> level(new LevelFile);  // owns the map from here on
+  level->map_ = static_cast<const std::byte*>(map);
+  level->map_bytes_ = file->bytes;
+  Result<LevelView> view = parse_level({level->map_, level->map_bytes_}, check, path.string());
+  if (!view) return tl::unexpected(view.error());
+  level->view_ = *view;
+  return level;
+}
+
+LevelFile::~LevelFile() {
+  if (map_ != nullptr) ::munmap(const_cast<std::byte*>(map_), map_bytes_);
+}
+
+uint64_t LevelFile::build_only_bytes() const { return level_file_sizes(view_).build_only_bytes; }
+
+void LevelFile::release_build_pages() const {
+  const FileRange pages = build_only_pages(layout_of(view_));
+  if (pages.end == pages.begin) return;
+  // A failure (pages locked by the host, a system with larger pages) only means that the memory stays in use.
+  ::madvise(const_cast<std::byte*>(map_) + pages.begin, pages.end - pages.begin, MADV_DONTNEED);
+}
+
+}  // namespace farfield

@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cache/manifest.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "base/hash.h"
+#include "cache/file_io.h"
+
+namespace farfield {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+constexpr uint64_t kMaxManifestBytes = uint64_t{16} << 20;
+constexpr size_t kMaxLevels = 64;  // each level halves the resolution: no double has more
+constexpr size_t kMaxHullPoints = 1 << 16;
+constexpr uint64_t kMaxBytes = uint64_t{1} << 50;
+constexpr uint64_t kMaxElements = uint64_t{1} << 32;
+constexpr int kMaxDepth = 16;  // of nesting; ours is 4
+
+// ---- what must hold, for reading and for writing ----
+
+/// A level's file lies in the asset's folder under a plain, visible name.
+bool is_plain_file_name(const std::string& name) {
+  const auto forbidden = [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < 0x20; };
+  return !name.empty() && name.size() <= 200 && name[0] != '.' && name != kManifestName &&
+         std::ranges::none_of(name, forbidden);
+}
+
+using Problem = std::optional<std::string>;
+
+Problem find_level_problem(const LevelEntry& level) {
+  if (level.level >= kMaxLevels) return fmt::format("level numbers end at {}", kMaxLevels - 1);
+  if (!std::isfinite(level.resolution) || !(level.resolution > 0)) return "its resolution is not positive";
+  if (!is_plain_file_name(level.file)) return fmt::format("\"{}\" is not a file name inside the folder", level.file);
+  for (const uint64_t bytes : {level.file_bytes, level.resident_bytes, level.build_peak_bytes}) {
+    if (bytes > kMaxBytes) return fmt::format("{} bytes are more than any level has", bytes);
+  }
+  for (const uint64_t count : {level.triangles, level.voxels, level.bricks}) {
+    if (count > kMaxElements) return fmt::format("{} elements are more than any level has", count);
+  }
+  if (level.errors) {
+    for (const double e : {level.errors->occlusion_error, level.errors->occlusion_rms, level.errors->color_error}) {
+      if (!std::isfinite(e)) return "its errors are not finite";
+    }
+  }
+  return {};
+}
+
+Problem find_problem(const Manifest& manifest) {
+  if (!is_finite(manifest.bounds.lower) || !is_finite(manifest.bounds.upper) || manifest.bounds.is_empty()) {
+    return "the bounds are empty or not finite";
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!std::isfinite(manifest.origin[axis])) return "the origin is not finite";
+  }
+  if (!std::isfinite(manifest.base_resolution) || !(manifest.base_resolution > 0)) {
+    return "base_resolution is not positive";
+  }
+  if (manifest.hull.size() > kMaxHullPoints) return fmt::format("the hull has more than {} points", kMaxHullPoints);
+  if (!std::ranges::all_of(manifest.hull, is_finite)) return "a hull point is not finite";
+  if (manifest.levels.empty()) return "there are no levels";
+  if (manifest.levels.size() > kMaxLevels) {
+    return fmt::format("there are {} levels, and at most {} are possible", manifest.levels.size(), kMaxLevels);
+  }
+  std::set<std::string> files;
+  for (size_t i = 0; i < manifest.levels.size(); ++i) {
+    const LevelEntry& level = manifest.levels[i];
+    if (Problem problem = find_level_problem(level)) return fmt::format("levels[{}]: {}", i, *problem);
+    if (i > 0 && level.level <= manifest.levels[i - 1].level) {
+      return fmt::format("levels[{}]: level {} follows level {}", i, level.level, manifest.levels[i - 1].level);
+    }
+    if (i > 0 && !(level.resolution > manifest.levels[i - 1].resolution)) {
+      return fmt::format("levels[{}]: its resolution is not coarser than the one before", i);
+    }
+    if (!files.insert(level.file).second) return fmt::format("levels[{}]: \"{}\" serves two levels", i, level.file);
+  }
+  return {};
+}
+
+// ---- JSON to values ----
+
+/// Reads fields and remembers the first thing that is wrong, so that the reading code states no errors itself.
+class FieldReader {
+ public:
+  Problem problem;
+
+  const Json* field(const Json& object, const char* key, const std::string& where) {
+    if (problem) return nullptr;
+    if (!object.is_object()) return fail(where, "an object");
+    const auto found = object.find(key);
+    if (found == object.end()) {
+      problem = fmt::format("\"{}\" is missing{}{}", key, where.empty() ? "" : " in ", where);
+      return nullptr;
+    }
+    return &*found;
+  }
+  std::string text(const Json& object, const char* key, const std::string& where = "") {
+    const Json* value = field(object, key, where);
+    if (value == nullptr) return {};
+    if (!value->is_string()) return fail(join(where, key), "a text"), std::string();
+    return value->get<std::string>();
+  }
+  uint64_t count(const Json& object, const char* key, const std::string& where = "") {
+    const Json* value = field(object, key, where);
+    if (value == nullptr) return 0;
+    if (!value->is_number_unsigned()) return fail(join(where, key), "an integer from 0 to 2^64 - 1"), 0;
+    return value->get<uint64_t>();
+  }
+  uint32_t count32(const Json& object, const char* key, const std::string& where) {
+    const uint64_t value = count(object, key, where);
+    if (value > 0xffffffffu) fail(join(where, key), "an integer below 2^32");
+    return static_cast<uint32_t>(value);
+  }
+  /// Hashes are text: many JSON tools round integers above 2^53.
+  uint64_t hash(const Json& object, const char* key, const std::string& where = "") {
+    const std::string digits = text(object, key, where);
+    uint64_t value = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);
+    if (digits.size() != 16 || error != std::errc() || end != digits.data() + digits.size()) {
+      fail(join(where, key), "a hash of 16 hexadecimal digits");
+    }
+    return value;
+  }
+  double number(const Json& value, const std::string& where) {
+    if (!value.is_number()) return fail(where, "a number"), 0.0;
+    return value.get<double>();
+  }
+  double number(const Json& object, const char* key, const std::string& where) {
+    const Json* value = field(object, key, where);
+    return value == nullptr ? 0.0 : number(*value, join(where, key));
+  }
+  dvec3 point(const Json& value, const std::string& where) {
+    if (problem) return {};
+    if (!value.is_array() || value.size() != 3) return fail(where, "three numbers"), dvec3();
+    return {number(value[0], where), number(value[1], where), number(value[2], where)};
+  }
+  dvec3 point(const Json& object, const char* key, const std::string& where = "") {
+    const Json* value = field(object, key, where);
+    return value == nullptr ? dvec3() : point(*value, join(where, key));
+  }
+  const Json& array(const Json& object, const char* key) {
+    static const Json kEmpty = Json::array();
+    const Json* value = field(object, key, "");
+    if (value == nullptr) return kEmpty;
+    if (!value->is_array()) return fail(key, "a list"), kEmpty;
+    return *value;
+  }
+
+ private:
+  static std::string join(const std::string& where, const char* key) {
+    return where.empty() ? std::string(key) : where + "." + key;
+  }
+  const Json* fail(const std::string& where, const char* expected) {
+    if (!problem) problem = fmt::format("{} must be {}", where, expected);
+    return nullptr;
+  }
+};
+
+LevelErrors errors_from_json(const Json& json, const std::string& where, FieldReader& read) {
+  LevelErrors errors;
+  errors.occlusion_error = read.number(json, "occlusion_error", where);
+  errors.occlusion_rms = read.number(json, "occlusion_rms", where);
+  errors.color_error = read.number(json, "color_error", where);
+  return errors;
+}
+
+LevelEntry level_from_json(const Json& json, const std::string& where, FieldReader& read) {
+  LevelEntry level;
+  level.level = read.count32(json, "level", where);
+  level.resolution = read.number(json, "resolution", where);
+  level.grid = read.count32(json, "grid", where);
+  level.file = read.text(json, "file", where);
+  level.file_bytes = read.count(json, "file_bytes", where);
+  level.file_hash = read.hash(json, "file_hash", where);
+  level.triangles = read.count(json, "triangles", where);
+  level.voxels = read.count(json, "voxels", where);
+  level.bricks = read.count(json, "bricks", where);
+  level.resident_bytes = read.count(json, "resident_bytes", where);
+  level.build_peak_bytes = read.count(json, "build_peak_bytes", where);
+  if (json.is_object() && json.contains("errors")) {
+    level.errors = errors_from_json(json["errors"], where + ".errors", read);
+  }
+  return level;
+}
+
+Manifest manifest_from_json(const Json& json, FieldReader& read) {
+  Manifest manifest;
+  manifest.generator = read.text(json, "generator");
+  manifest.source = read.text(json, "source");
+  manifest.source_hash = read.hash(json, "source_hash");
+  manifest.options = read.text(json, "options");
+  manifest.origin = read.point(json, "origin");
+  manifest.bounds.lower = vec3(read.point(json, "bounds_lower"));
+  manifest.bounds.upper = vec3(read.point(json, "bounds_upper"));
+  manifest.base_resolution = read.number(json, "base_resolution", "");
+  for (const Json& point : read.array(json, "hull")) {
+    if (read.problem || manifest.hull.size() > kMaxHullPoints) break;
+    manifest.hull.push_back(vec3(read.point(point, fmt::format("hull[{}]", manifest.hull.size()))));
+  }
+  const Json& levels = read.array(json, "levels");
+  if (levels.size() > kMaxLevels) {
+    read.problem = fmt::format("there are {} levels, and at most {} are possible", levels.size(), kMaxLevels);
+  }
+  for (size_t i = 0; i < levels.size() && !read.problem; ++i) {
+    manifest.levels.push_back(level_from_json(levels[i], fmt::format("levels[{}]", i), read));
+  }
+  return manifest;
+}
+
+// ---- values to JSON ----
+
+Json to_json(const dvec3& point) { return Json::array({point.x, point.y, point.z}); }
+
+Json to_json(const LevelEntry& level) {
+  Json json = {{"level", level.level},
+               {"resolution", level.resolution},
+               {"grid", level.grid},
+               {"file", level.file},
+               {"file_bytes", level.file_bytes},
+               {"file_hash", to_hex(level.file_hash)},
+               {"triangles", level.triangles},
+               {"voxels", level.voxels},
+               {"bricks", level.bricks},
+               {"resident_bytes", level.resident_bytes},
+               {"build_peak_bytes", level.build_peak_bytes}};
+  if (level.errors) {
+    json["errors"] = {{"occlusion_error", level.errors->occlusion_error},
+                      {"occlusion_rms", level.errors->occlusion_rms},
+                      {"color_error", level.errors->color_error}};
+  }
+  return json;
+}
+
+}  // namespace
+
+std::string manifest_to_json(const Manifest& manifest) {
+  Json hull = Json::array();
+  for (const vec3& point : manifest.hull) hull.push_back(to_json(dvec3(point)));
+  Json levels = Json::array();
+  for (const LevelEntry& level : manifest.levels) levels.push_back(to_json(level));
+  const Json json = {{"version", manifest.version},
+                     {"generator", manifest.generator},
+                     {"source", manifest.source},
+                     {"source_hash", to_hex(manifest.source_hash)},
+                     {"options", manifest.options},
+                     {"origin", to_json(manifest.origin)},
+                     {"bounds_lower", to_json(dvec3(manifest.bounds.lower))},
+                     {"bounds_upper", to_json(dvec3(manifest.bounds.upper))},
+                     {"base_resolution", manifest.base_resolution},
+                     {"levels", std::move(levels)},
+                     {"hull", std::move(hull)}};
+  // `replace`: a source's file name need not be UTF-8, JSON must be.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+Result<Manifest> manifest_from_json(std::string_view text, std::string_view name) {
+  const auto broken = [&](std::string_view problem) {
+    return make_error(ErrorCode::BadFile, fmt::format("broken manifest {}: {}; bake the asset again", name, problem));
+  };
+  Json json;
+  try {
+    bool too_deep = false;
+    json = Json::parse(text, [&](int depth, Json::parse_event_t, Json&) {
+      too_deep |= depth > kMaxDepth;
+      return depth <= kMaxDepth;
+    });
+    if (too_deep) return broken(fmt::format("it is nested deeper than {}", kMaxDepth));
+  } catch (const Json::exception& error) {  // the only way to learn where the syntax is wrong
+    return broken(error.what());
+  }
+
+  FieldReader read;
+  const uint64_t version = read.count(json, "version");
+  if (!read.problem && version > static_cast<uint64_t>(kFormatVersion)) {
+    return make_error(ErrorCode::Unsupported,
+                      fmt::format("{} has format version {}, and this Farfield reads up to {}: use a newer Farfield",
+                                  name, version, kFormatVersion));
+  }
+  if (!read.problem && version == 0) read.problem = "the format version is 0";
+  Manifest manifest = manifest_from_json(json, read);
+  if (!read.problem) read.problem = find_problem(manifest);
+  if (read.problem) return broken(*read.problem);
+  manifest.version = static_cast<int>(version);
+  return manifest;
+}
+
+Result<Manifest> read_manifest(const fs::path& asset_dir) {
+  const fs::path path = asset_dir / kManifestName;
+  const Result<std::string> text = read_small_file(path, kMaxManifestBytes);
+  if (!text && text.error().code == ErrorCode::NotFound) {
+    return make_error(ErrorCode::NotFound, fmt::format("{} is not a baked asset: it has no {}; make one with "
+                                                       "`farfield bake SOURCE -o NAME.farfield`",
+                                                       asset_dir.string(), kManifestName));
+  }
+  if (!text) return tl::unexpected(text.error());
+  return manifest_from_json(*text, path.string());
+}
+
+Result<void> write_manifest(const fs::path& asset_dir, const Manifest& manifest) {
+  const fs::path path = asset_dir / kManifestName;
+  if (const Problem problem = find_problem(manifest)) {
+    return make_error(ErrorCode::InvalidArgument, fmt::format("cannot write {}: {}", path.string(), *problem));
+  }
+  const std::string text = manifest_to_json(manifest);
+  const std::span<const std::byte> bytes = std::as_bytes(std::span(text));
+  return write_file_atomically(path, std::span(&bytes, 1));
+}
+
+}  // namespace farfield

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lodselect/footprint.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace farfield {
+
+namespace {
+
+/// x or 0; NaN stays NaN, so that it does not look like "inside the box".
+double positive_part(double x) { return x <= 0 ? 0.0 : x; }
+
+/// Distance from a point to the nearest point of a box; 0 inside. In double: squares of large floats overflow a float.
+double distance_to(const Box3& box, const vec3& point) {
+  double squared = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double below = positive_part(static_cast<double>(box.lower[axis]) - point[axis]);
+    const double above = positive_part(static_cast<double>(point[axis]) - box.upper[axis]);
+    squared += below * below + above * above;
+  }
+  return std::sqrt(squared);
+}
+
+}  // namespace
+
+float lambda_of_footprint(float footprint, float base_resolution, int coarsest_level) {
+  if (!(footprint > base_resolution)) return 0.0f;  // also for NaN of either
+  const float lambda = std::log2(footprint / base_resolution);
+  return std::clamp(lambda, 0.0f, static_cast<float>(std::max(coarsest_level, 0)));
+}
+
+float finest_footprint(std::span<const FootprintCamera> cameras, const Box3& bounds_world) {
+  float finest = std::numeric_limits<float>::infinity();
+  if (bounds_world.is_empty()) return finest;
+  for (const FootprintCamera& camera : cameras) {
+    const double footprint = camera.pixel_width + camera.pixel_spread * distance_to(bounds_world, camera.position);
+    if (std::isnan(footprint)) return 0.0f;
+    finest = std::min(finest, static_cast<float>(footprint));
+  }
+  return finest;
+}
+
+LevelBlend split_lambda(float lambda) {
+  constexpr float kFarBeyondAnyLevel = 1e6f;
+  if (!(lambda > 0.0f)) return {0, 0.0f};
+  lambda = std::min(lambda, kFarBeyondAnyLevel);
+  const float level = std::floor(lambda);
+  return {static_cast<int>(level), lambda - level};  // exact, so below 1
+}
+
+}  // namespace farfield
