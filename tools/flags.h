@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Flags whose values our own parsers read. Includes CLI11: only for the commands' .cpp files.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "base/result.h"
+
+namespace farfield::tool {
+
+/// An option that `parse` (text -> Result<T>) reads into `target`; what it refuses is an error that names the flag.
+template <typename T, typename Parse>
+CLI::Option* add_parsed_option(CLI::App* app, const std::string& flag, T& target, Parse parse,
+                               const std::string& help) {
+  const auto read = [&target, parse, flag](const std::string& text) {
+    auto value = parse(text);
+    if (!value) throw CLI::ValidationError(flag, value.error().message);
+    target = *value;
+  };
+  return app->add_option_function<std::string>(flag, read, help);
+}
+
+}  // namespace farfield::tool

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include "base/bytes.h"
+#include "tools/commands.h"
+#include "tools/console.h"
+#include "tools/flags.h"
+#include "tools/render_flags.h"
+
+namespace farfield::tool {
+namespace {
+
+struct FrameArguments : RenderArguments {
+  int frame = 0;
+};
+
+Result<void> run_render(FrameArguments& arguments) {
+  if (auto writable = check_can_write(arguments.output, Output::Picture); !writable) return writable;
+  const auto report = run_with_progress(arguments, [&](const RenderOptions& options) {
+    return render_frame(options, arguments.frame, arguments.output);
+  });
+  if (!report) return tl::unexpected(report.error());
+  if (stdout_is_terminal() && !report->frames.empty())
+    fmt::print("{}: {:.1f} s, {} of {} for assets\n", arguments.output, report->frames.back().seconds,
+               format_bytes(report->peak_accounted_bytes), format_bytes(report->budget_bytes));
+  return {};
+}
+
+}  // namespace
+
+void add_render_command(CLI::App& app, Action& action) {
+  auto arguments = std::make_shared<FrameArguments>();
+  CLI::App* command =
+      app.add_subcommand("render", "Render one frame of a glTF scene; bakes its meshes first if need be");
+  add_render_flags(command, *arguments, "EXR file to write; a PNG preview goes beside it");
+  command->add_option("--frame", arguments->frame, "Frame n is the scene at n / 24 s")
+      ->check(CLI::Range(0, 1 << 24))
+      ->capture_default_str();
+  command->footer(
+      "Example:\n  farfield render forest.glb --frame 60 --size 960x540 --spp 64 --budget 2G -o forest.exr");
+  command->callback([arguments, &action] { action = [arguments] { return run_render(*arguments); }; });
+}
+
+}  // namespace farfield::tool

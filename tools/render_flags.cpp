@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/render_flags.h"
+
+#include <fmt/format.h>
+
+#include "base/bytes.h"
+#include "base/parallel.h"
+#include "samples/path_tracer/progress.h"
+#include "tools/args.h"
+#include "tools/console.h"
+#include "tools/flags.h"
+#include "tools/interrupt.h"
+
+namespace farfield::tool {
+namespace {
+
+Result<Blend> parse_blend(const std::string& text) {
+  if (text == "dissolve") return Blend::Dissolve;
+  if (text == "morph")
+    return make_error(ErrorCode::Unsupported, "this version cannot morph; levels carry the data, dissolve works");
+  return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a way to blend; dissolve is", text));
+}
+
+}  // namespace
+
+void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::string& output_help) {
+  RenderOptions& options = arguments.options;
+  command->add_option("scene", arguments.scene, "glTF scene: .glb or .gltf")->required();
+  command->add_option("-o,--output", arguments.output, output_help)->required();
+  const auto set_size = [&options](const std::string& text) {
+    const auto size = parse_pixel_size(text);
+    if (!size) throw CLI::ValidationError("--size", size.error().message);
+    options.width = size->width, options.height = size->height;
+  };
+  command->add_option_function<std::string>("--size", set_size, "Pixels WxH")
+      ->default_str(fmt::format("{}x{}", options.width, options.height));
+  command->add_option("--spp", options.trace.samples_per_pixel, "Samples per pixel")
+      ->check(CLI::Range(1, 1 << 20))
+      ->capture_default_str();
+  command->add_option("--seed", options.trace.seed, "Of the random numbers");
+  add_parsed_option(command, "--budget", options.budget_bytes, parse_bytes,
+                    "Memory for assets, e.g. 300M or 4GiB: a hard limit")
+      ->default_str(format_bytes(options.budget_bytes));
+  command->add_option("--assets", arguments.assets,
+                      "Folder of baked assets; what is missing is baked. Without it farfield-assets beside the scene");
+  add_parsed_option(command, "--blend", options.blend, parse_blend, "How neighbouring levels are mixed: dissolve")
+      ->default_str("dissolve");
+  command->add_option("--lod-scale", options.lod_scale, "Multiplies footprints: above 1 coarser and cheaper")
+      ->check(CLI::Range(1e-6, 1e6))
+      ->capture_default_str();
+  command->add_flag("--full-detail", options.full_detail, "Render the sources, without levels, for comparison");
+  command->add_option("--environment", arguments.environment, "Light from a latitude-longitude EXR");
+  command->add_option("--exposure", options.exposure_stops, "Of the PNG previews, in stops")
+      ->check(CLI::Range(-50, 50));
+  command->add_option("--finest-grid", options.finest_grid, "Of assets that have to be baked")->capture_default_str();
+  command->add_option("--threads", arguments.threads, "0: as many as the machine has")
+      ->check(CLI::Range(0, 4096))
+      ->capture_default_str();
+}
+
+Result<RenderReport> run_with_progress(RenderArguments& arguments,
+                                       const std::function<Result<RenderReport>(const RenderOptions&)>& job) {
+  const ThreadLimit limit(arguments.threads);
+  ProgressLine progress;
+  RenderOptions& options = arguments.options;
+  options.scene = arguments.scene;
+  options.assets = arguments.assets;
+  options.environment = arguments.environment;
+  options.progress = [&](double done, const std::string& what) { progress.update(done, what); };
+  options.message = [&](const std::string& line) {
+    if (!stdout_is_terminal()) return;
+    progress.clear();
+    fmt::print("{}\n", one_line(line));
+  };
+  options.cancel = &catch_interrupts();
+  return job(options);
+}
+
+}  // namespace farfield::tool

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// What `farfield render` and `farfield shot` have in common.
+#pragma once
+
+#include <string>
+
+#include "samples/path_tracer/render_job.h"
+
+namespace CLI {
+class App;
+}
+
+namespace farfield::tool {
+
+struct RenderArguments {
+  RenderOptions options;
+  std::string scene, assets, environment, output;
+  int threads = 0;
+};
+
+/// Adds the scene, the common flags and -o (with `output_help`).
+void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::string& output_help);
+
+/// Runs `job` with the parsed options, progress on a terminal, and Ctrl-C; prints messages of the job when a person
+/// reads them.
+Result<RenderReport> run_with_progress(RenderArguments& arguments,
+                                       const std::function<Result<RenderReport>(const RenderOptions&)>& job);
+
+}  // namespace farfield::tool

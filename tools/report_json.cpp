@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/report_json.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "base/hash.h"
+
+namespace farfield::tool {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// What the manifest knows of a level, with what the bake's stages did for it, if they ran.
+Json level_json(const LevelEntry& entry, const BakeReport& report) {
+  Json json = {{"level", entry.level},
+               {"grid", entry.grid},
+               {"resolution", entry.resolution},
+               {"triangles", entry.triangles},
+               {"voxels", entry.voxels},
+               {"bytes_disk", entry.file_bytes},
+               {"bytes_resident", entry.resident_bytes},
+               {"bytes_build_peak", entry.build_peak_bytes},
+               {"file", entry.file}};
+  const auto stages = std::find_if(report.levels.begin(), report.levels.end(),
+                                   [&](const LevelReport& level) { return level.level == entry.level; });
+  if (stages == report.levels.end()) return json;
+  json["resumed"] = stages->resumed;
+  json["macrosurface_triangles"] = stages->macrosurface_triangles;
+  json["voxelized_triangles"] = stages->voxelized_triangles;
+  json["seconds"] = {{"analysis", stages->analysis_seconds},
+                     {"simplify", stages->simplify_seconds},
+                     {"voxelize", stages->voxelize_seconds},
+                     {"write", stages->write_seconds}};
+  return json;
+}
+
+}  // namespace
+
+std::string bake_report_json(const BakeReport& report) {
+  Json levels = Json::array();
+  for (const LevelEntry& entry : report.manifest.levels) levels.push_back(level_json(entry, report));
+  const Json json = {{"source", report.manifest.source},
+                     {"source_hash", to_hex(report.manifest.source_hash)},
+                     {"options", report.manifest.options},
+                     {"up_to_date", report.up_to_date},
+                     {"import_seconds", report.import_seconds},
+                     {"total_seconds", report.total_seconds},
+                     {"warnings", report.warnings},
+                     {"levels", levels}};
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace farfield::tool

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// What `farfield bake --report` writes.
+#pragma once
+
+#include <string>
+
+#include "prefilter/bake.h"
+
+namespace farfield::tool {
+
+/// The report as JSON text: levels with sizes and seconds, warnings, totals.
+std::string bake_report_json(const BakeReport& report);
+
+}  // namespace farfield::tool

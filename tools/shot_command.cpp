@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "samples/path_tracer/shot_job.h"
+
+#include <fmt/format.h>
+
+#include "base/bytes.h"
+#include "tools/commands.h"
+#include "tools/console.h"
+#include "tools/flags.h"
+#include "tools/render_flags.h"
+
+namespace farfield::tool {
+namespace {
+
+struct ShotArguments : RenderArguments {
+  FrameRange frames;
+};
+
+Result<void> run_shot(ShotArguments& arguments) {
+  const auto report = run_with_progress(arguments, [&](const RenderOptions& options) {
+    return render_shot(options, arguments.frames, arguments.output);
+  });
+  if (!report) return tl::unexpected(report.error());
+  if (stdout_is_terminal())
+    fmt::print("{}: {} frames, {} of {} for assets\n", arguments.output, report->frames.size(),
+               format_bytes(report->peak_accounted_bytes), format_bytes(report->budget_bytes));
+  return {};
+}
+
+}  // namespace
+
+void add_shot_command(CLI::App& app, Action& action) {
+  auto arguments = std::make_shared<ShotArguments>();
+  CLI::App* command =
+      app.add_subcommand("shot", "Render a range of frames within one memory budget; keeps finished frames");
+  add_render_flags(command, *arguments, "Folder for the frames, shot.json and the contact sheet");
+  add_parsed_option(command, "--frames", arguments->frames, parse_frame_range, "A-B[:STEP]")->required();
+  command->footer(
+      "Example:\n  farfield shot forest.glb --frames 0-120:10 --size 640x360 --spp 48 --budget 500M -o shot");
+  command->callback([arguments, &action] { action = [arguments] { return run_shot(*arguments); }; });
+}
+
+}  // namespace farfield::tool
