@@ -45,18 +45,21 @@ inline float min_component(const vec3& v) { return std::min(v.x, std::min(v.y, v
 inline bool is_finite(const vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 /// An orthonormal basis around a unit vector, without branches near the pole [Duff et al. 2017].
-struct Frame {
-  vec3 x, y, z;
+template <typename T>
+struct BasicFrame {
+  using Vec = glm::vec<3, T>;
+  Vec x, y, z;
 
-  explicit Frame(const vec3& unit_z) : z(unit_z) {
-    const float sign = std::copysign(1.0f, z.z);
-    const float a = -1.0f / (sign + z.z);
-    const float b = z.x * z.y * a;
-    x = vec3(1.0f + sign * z.x * z.x * a, sign * b, -sign * z.x);
-    y = vec3(b, sign + z.y * z.y * a, -z.y);
+  explicit BasicFrame(const Vec& unit_z) : z(unit_z) {
+    const T sign = std::copysign(T(1), z.z);
+    const T a = T(-1) / (sign + z.z);
+    const T b = z.x * z.y * a;
+    x = Vec(T(1) + sign * z.x * z.x * a, sign * b, -sign * z.x);
+    y = Vec(b, sign + z.y * z.y * a, -z.y);
   }
-  vec3 to_world(const vec3& v) const { return v.x * x + v.y * y + v.z * z; }
-  vec3 to_local(const vec3& v) const { return {glm::dot(v, x), glm::dot(v, y), glm::dot(v, z)}; }
+  Vec to_world(const Vec& v) const { return v.x * x + v.y * y + v.z * z; }
+  Vec to_local(const Vec& v) const { return {glm::dot(v, x), glm::dot(v, y), glm::dot(v, z)}; }
 };
+using Frame = BasicFrame<float>;
 
 }  // namespace farfield

@@ -1,16 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 // The reflectance of prefiltered surfaces: ellipsoid-NDF microfacets, diffuse and specular, and diffuse transmission
 // (thesis 8.3.9-8.3.11, formula notes section 6). Surfaces are two-sided.
+//
+//   specular      F D(h) G2 / (4 n.wo n.wi)            D of specular_sggx(sggx, roughness2)
+//   diffuse       E_m [ diffuse c(wo) c(wi) <wi.m> G2 / G1u(wo) ] / (pi n.wi)
+//   transmission  the same to the other side, with <-wi.m>, and masking on both sides independently
+//
+// m are the facets of sggx visible from wo. c(w) = 1 - (mean Fresnel of the specular facets visible from w), over the
+// square root of its mean: the light that does not meet the specular lobe is there for the lobes underneath. So all
+// three are reciprocal and their albedos sum to at most 1 for every wo; on a flat face a diffuse lobe alone is exactly
+// Lambertian. What microfacets reflect onto each other is lost, as in the thesis.
 #pragma once
 
 #include "base/random.h"
 #include "base/vec.h"
+#include "scattering/microfacet.h"
 #include "scattering/scatter_sample.h"
 #include "scattering/sym_mat3.h"
 
 namespace farfield {
 
 /// Reflectance parameters of a face in the space of the directions (world). Albedos in [0, 1], linear RGB.
+/// diffuse + transmission above 1 is scaled down to 1.
 struct SurfaceParams {
   SymMat3 sggx;  ///< distribution of normals, any scale; specular lobe: specular_sggx(sggx, roughness2)
   vec3 diffuse{0.0f};
@@ -32,9 +43,21 @@ class SurfaceBsdf {
   ScatterResult sample(Rng& rng) const;
 
  private:
-  SurfaceParams params_;
-  vec3 n_;
-  vec3 wo_;
+  vec3 eval_specular(const vec3& wi, float cos_i) const;
+  vec3 eval_base(const vec3& wi, float cos_i, Rng& rng) const;
+  vec3 left_by_specular(const vec3& w, Rng& rng) const;
+
+  Microfacets specular_facets_;  ///< valid if specular_chance_ > 0
+  Microfacets base_facets_;      ///< valid if not flat_
+  vec3 n_, wo_;
+  vec3 diffuse_{0.0f}, specular_{0.0f}, transmission_{0.0f};
+  float cos_o_ = 0;
+  float f90_ = 0;
+  float alpha_ = 0;            ///< of the specular lobe on flat faces
+  float specular_chance_ = 0;  ///< how often sample() picks the lobe; all 0: black
+  float diffuse_chance_ = 0;
+  float transmission_chance_ = 0;
+  bool flat_ = true;  ///< sggx is n n^T: the base is Lambertian
 };
 
 }  // namespace farfield

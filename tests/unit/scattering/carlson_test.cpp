@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scattering/carlson.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "base/random.h"
+#include "scattering/convention.h"
+
+namespace farfield {
+namespace {
+
+constexpr double kPiD = kPiOf<double>;
+
+TEST(CarlsonRg, MeetsItsClosedForms) {
+  EXPECT_NEAR(carlson_rg(1, 1, 1), 1, 1e-14);
+  EXPECT_NEAR(carlson_rg(1, 1, 0), kPiD / 4, 1e-14);
+  EXPECT_NEAR(carlson_rg(0, 1, 0), 0.5, 1e-15);
+  EXPECT_EQ(carlson_rg(0, 0, 0), 0);
+  for (const double b : {0.9, 0.5, 0.1, 1e-2, 1e-4, 1e-8, 1e-12}) {
+    const double needle = 0.5 * (1 + b / std::sqrt(1 - b) * std::asinh(std::sqrt((1 - b) / b)));
+    const double disk = 0.5 * (std::sqrt(b) + std::acos(std::sqrt(b)) / std::sqrt(1 - b));
+    EXPECT_NEAR(carlson_rg(1, b, b), needle, 1e-14 * needle) << b;
+    EXPECT_NEAR(carlson_rg(b, 1, 1), disk, 1e-14 * disk) << b;
+  }
+}
+
+TEST(CarlsonRg, IsSymmetricAndHomogeneous) {
+  const double reference = carlson_rg(0.3, 1.7, 0.02);
+  EXPECT_DOUBLE_EQ(carlson_rg(1.7, 0.02, 0.3), reference);
+  EXPECT_DOUBLE_EQ(carlson_rg(0.02, 0.3, 1.7), reference);
+  EXPECT_NEAR(carlson_rg(0.3e10, 1.7e10, 0.02e10), 1e5 * reference, 1e-9);
+  EXPECT_NEAR(carlson_rg(0.3e-10, 1.7e-10, 0.02e-10), 1e-5 * reference, 1e-19);
+}
+
+TEST(CarlsonRg, FastFitStaysWithinItsError) {
+  double worst = 0;
+  for (int i = 0; i <= 200; ++i) {
+    for (int j = 0; j <= 200; ++j) {
+      const double y = std::pow(i / 200.0, 4), z = std::pow(j / 200.0, 4);
+      const double exact = carlson_rg(1, y, z);
+      worst = std::max(worst, std::abs(carlson_rg_fast(1, float(y), float(z)) / exact - 1));
+    }
+  }
+  EXPECT_LT(worst, 7e-4);
+  EXPECT_GT(worst, 5e-4) << "the fit is better than documented";
+  EXPECT_EQ(carlson_rg_fast(0, 0, 0), 0);
+}
+
+}  // namespace
+}  // namespace farfield
