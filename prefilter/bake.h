@@ -66,4 +66,8 @@ struct BakeReport {
 Result<BakeReport> bake(const std::filesystem::path& source, const std::filesystem::path& out,
                         const BakeOptions& options);
 
+/// The same for an asset in memory; source_name goes into the manifest. options.import only names what was asked for.
+Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, const std::filesystem::path& out,
+                        const BakeOptions& options);
+
 }  // namespace farfield

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/check.h"
+#include "scattering/sggx.h"
 
 namespace farfield {
 namespace {
@@ -103,33 +104,6 @@ const Octant& octant_for(double optical_depth) {
 }
 
 }  // namespace
-
-dvec3 eigenvalues(const SymMat3& s) {
-  // Jacobi rotations in double: exact enough for the square roots of eigenvalues that are nearly 0.
-  double a[3][3] = {{s.xx, s.xy, s.xz}, {s.xy, s.yy, s.yz}, {s.xz, s.yz, s.zz}};
-  for (int sweep = 0; sweep < 12; ++sweep) {
-    const double off = std::abs(a[0][1]) + std::abs(a[0][2]) + std::abs(a[1][2]);
-    if (off <= 1e-15 * (std::abs(a[0][0]) + std::abs(a[1][1]) + std::abs(a[2][2]))) break;
-    for (int p = 0; p < 2; ++p) {
-      for (int q = p + 1; q < 3; ++q) {
-        if (a[p][q] == 0) continue;
-        const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
-        const double t = std::copysign(1.0, theta) / (std::abs(theta) + std::sqrt(theta * theta + 1));
-        const double c = 1 / std::sqrt(t * t + 1), sine = t * c;
-        const int r = 3 - p - q;
-        const double apq = a[p][q], arp = a[r][p], arq = a[r][q];
-        a[p][p] -= t * apq;
-        a[q][q] += t * apq;
-        a[p][q] = a[q][p] = 0;
-        a[r][p] = a[p][r] = c * arp - sine * arq;
-        a[r][q] = a[q][r] = sine * arp + c * arq;
-      }
-    }
-  }
-  std::array<double, 3> e = {std::max(a[0][0], 0.0), std::max(a[1][1], 0.0), std::max(a[2][2], 0.0)};
-  std::sort(e.begin(), e.end());
-  return {e[2], e[1], e[0]};
-}
 
 double optical_depth_of_hits(uint32_t hits, uint32_t rays) {
   FARFIELD_ASSERT(rays > 0 && hits <= rays);

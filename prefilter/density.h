@@ -13,9 +13,6 @@ namespace farfield {
 /// would be more opaque in its own plane.
 inline constexpr double kMaxDensityLength = 400;
 
-/// Eigenvalues of a symmetric matrix, largest first; those below 0 by rounding are returned as 0. Pure.
-dvec3 eigenvalues(const SymMat3& s);
-
 /// Optical depth tau = -log(1 - hits / rays) of rays that hit something `hits` times: unbiased for the transmittance
 /// over the rays' length. All hit: as if half a ray had passed, so at most log(2 rays). rays > 0, hits <= rays.
 double optical_depth_of_hits(uint32_t hits, uint32_t rays);

@@ -35,9 +35,14 @@ struct MorphMaps {
   std::vector<uint32_t> face;    ///< as LevelArrays::morph_face
 };
 
-/// Packs one level. `surface` is in final order (the result of reorder with `order`). A channel whose values are all
-/// the default is left out. header.bounds covers the surface and all active voxels.
+/// Packs a volume alone: a level with neither number nor surface, whose resolution is the voxel size. Densities become
+/// bytes per brick, none of them 0. A channel whose values are all the default is left out. header.bounds covers the
+/// stored voxels. An empty volume gives a level without volume and with empty bounds.
+LevelData pack_volume(const SparseVolume& volume);
+
+/// Completes a level: `volume` (from pack_volume) gets its number, resolution, surface and morph map. `surface` is in
+/// final order (the result of reorder with `order`). header.bounds covers surface and volume.
 LevelData pack_level(uint32_t level, double resolution, const Surface& surface, const SurfaceOrder& order,
-                     const SparseVolume& volume, MorphMaps morph);
+                     LevelData volume, MorphMaps morph);
 
 }  // namespace farfield

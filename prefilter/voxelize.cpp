@@ -17,8 +17,8 @@
 
 #include "base/hash.h"
 #include "base/parallel.h"
-#include "base/random.h"
 #include "prefilter/density.h"
+#include "scattering/sggx.h"
 
 namespace farfield {
 namespace {
@@ -262,30 +262,87 @@ struct HitSums {
   }
 };
 
-/// Standard normals in pairs [Box and Muller 1958].
-vec2 sample_normals(Rng& rng) {
-  const float radius = std::sqrt(-2 * std::log(1 - rng.next())), angle = 2 * kPi * rng.next();
-  return radius * vec2(std::cos(angle), std::sin(angle));
-}
+/// The origins and directions of thesis algorithm 1, in voxels around a voxel's centre, from 128 random bits per ray.
+class RaySampler {
+ public:
+  static const RaySampler& instance() {
+    static const RaySampler sampler;
+    return sampler;
+  }
 
-vec3 sample_direction(Rng& rng) {
-  const float z = 2 * rng.next() - 1, angle = 2 * kPi * rng.next(), r = std::sqrt(std::max(0.0f, 1 - z * z));
-  return {r * std::cos(angle), r * std::sin(angle), z};
-}
+  /// Origin: uniform in the unit cube plus a Gaussian of sigma 0.6. 21 bits per axis.
+  vec3 origin(uint64_t bits) const {
+    return {offset(bits & 0x1fffff), offset(bits >> 21 & 0x1fffff), offset(bits >> 42 & 0x1fffff)};
+  }
+  /// Uniform on the sphere. The azimuth is one of 4096: far finer than what 200 rays can tell.
+  vec3 direction(uint64_t bits) const {
+    const float z = 2 * to_unit_float(bits) - 1, r = std::sqrt(std::max(0.0f, 1 - z * z));
+    const vec2& c = circle_[bits & (kCells - 1)];
+    return {r * c.x, r * c.y, z};
+  }
 
-/// Casts rays of thesis algorithm 1 from around `center`: origin uniform in the voxel plus a Gaussian of 0.6 voxels,
-/// direction uniform, length one voxel. What a ray hits first counts.
-void cast_rays(RTCScene scene, const Surface& geometry, const vec3& center, float voxel_size, uint32_t rays, Rng& rng,
-               HitSums& sums) {
-  constexpr float kSigma = 0.6f;
+ private:
+  static constexpr int kCells = 4096;
+
+  RaySampler() {
+    for (int i = 0; i <= kCells; ++i) {
+      const double clipped = std::clamp(i / double(kCells), 0.1 / kCells, 1 - 0.1 / kCells);  // 4 sigma
+      quantile_[static_cast<size_t>(i)] = static_cast<float>(find_quantile(clipped));
+    }
+    for (int i = 0; i < kCells; ++i) {
+      const double angle = 2 * M_PI * (i + 0.5) / kCells;
+      circle_[static_cast<size_t>(i)] = vec2(std::cos(angle), std::sin(angle));
+    }
+  }
+
+  /// P(u + 0.6 g < x) for u uniform in (-1/2, 1/2) and g normal: the mean of the normal distribution over an interval.
+  static double cumulative(double x) {
+    constexpr double kSigma = 0.6;
+    const auto integral = [](double t) {  // of the cumulative normal distribution
+      return t * 0.5 * std::erfc(-t / M_SQRT2) + std::exp(-0.5 * t * t) / std::sqrt(2 * M_PI);
+    };
+    return kSigma * (integral((x + 0.5) / kSigma) - integral((x - 0.5) / kSigma));
+  }
+  static double find_quantile(double p) {
+    double lower = -5, upper = 5;
+    for (int i = 0; i < 60; ++i) {
+      const double middle = 0.5 * (lower + upper);
+      (cumulative(middle) < p ? lower : upper) = middle;
+    }
+    return lower;
+  }
+
+  /// The quantile function from its table: 12 bits choose the cell, 9 the place in it.
+  float offset(uint64_t bits) const {
+    const size_t cell = bits >> 9;
+    return quantile_[cell] + (quantile_[cell + 1] - quantile_[cell]) * (static_cast<float>(bits & 0x1ff) + 0.5f) / 512;
+  }
+
+  std::array<float, kCells + 1> quantile_;
+  std::array<vec2, kCells> circle_;
+};
+
+/// A stream of random bits [Steele, Lea and Flood 2014].
+class SplitMix {
+ public:
+  explicit SplitMix(uint64_t seed) : state_(seed) {}
+  uint64_t next() { return mix64(state_ += 0x9e3779b97f4a7c15ull); }
+
+ private:
+  uint64_t state_;
+};
+
+/// Casts rays of one voxel length from around `center`. What a ray hits first counts. Single rays: packets of 8 or 16
+/// are no more than 6 % faster for rays that are so short and go everywhere.
+void cast_rays(RTCScene scene, const Surface& geometry, const vec3& center, float voxel_size, uint32_t rays,
+               SplitMix& random, HitSums& sums) {
+  const RaySampler& sampler = RaySampler::instance();
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   for (uint32_t i = 0; i < rays; ++i) {
-    const vec2 a = sample_normals(rng), b = sample_normals(rng);
-    const vec3 cube(rng.next() - 0.5f, rng.next() - 0.5f, rng.next() - 0.5f);
-    const vec3 origin = center + voxel_size * (cube + kSigma * vec3(a.x, a.y, b.x));
-    const vec3 direction = sample_direction(rng);
-    RTCRayHit ray{};
+    const vec3 origin = center + voxel_size * sampler.origin(random.next());
+    const vec3 direction = sampler.direction(random.next());
+    RTCRayHit ray;
     ray.ray = {origin.x,    origin.y, origin.z,   0,           direction.x, direction.y,
                direction.z, 0,        voxel_size, 0xffffffffu, 0,           0};
     ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -301,24 +358,21 @@ Voxel measure_voxel(RTCScene scene, const Surface& geometry, const VoxelLattice&
   const float voxel_size = static_cast<float>(lattice.voxel_size);
   const uint64_t place =
       static_cast<uint64_t>(static_cast<uint32_t>(coordinate.x)) << 32 | static_cast<uint32_t>(coordinate.y);
-  Rng rng(mix64(mix64(options.seed, place), static_cast<uint64_t>(static_cast<uint32_t>(coordinate.z))));
+  SplitMix random(mix64(mix64(options.seed, place), static_cast<uint32_t>(coordinate.z)));
 
   HitSums sums;
   uint32_t rays = options.rays_per_voxel;
-  cast_rays(scene, geometry, center, voxel_size, rays, rng, sums);
+  cast_rays(scene, geometry, center, voxel_size, rays, random, sums);
   // A transmittance that is the share of a handful of rays is mostly noise: cast as many rays again until it is not.
   while (rays - sums.hits < kEnoughMisses && rays < kMaxRayFactor * options.rays_per_voxel) {
-    cast_rays(scene, geometry, center, voxel_size, rays, rng, sums);
+    cast_rays(scene, geometry, center, voxel_size, rays, random, sums);
     rays *= 2;
   }
 
   Voxel voxel;
   if (sums.hits == 0) return voxel;
   const float share = 1 / static_cast<float>(sums.hits);
-  const SymMat3 mean = sums.sggx * share;
-  const float largest = static_cast<float>(eigenvalues(mean).x);
-  if (!(largest > 0)) return voxel;
-  voxel.sggx = mean * (1 / largest);
+  voxel.sggx = normalise_sggx(sums.sggx).sggx;
   voxel.density =
       static_cast<float>(solve_density(voxel.sggx, optical_depth_of_hits(sums.hits, rays), lattice.voxel_size));
   voxel.diffuse = sums.diffuse * share;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "base/result.h"
 
@@ -24,5 +25,8 @@ class TemporaryFile {
   std::filesystem::path target_;
   std::filesystem::path path_;
 };
+
+/// Writes text to a file through a TemporaryFile. Errors: Io.
+Result<void> write_text_file(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace farfield

@@ -19,38 +19,6 @@ vec3 random_direction(Rng& rng) {
   return {r * std::cos(angle), r * std::sin(angle), z};
 }
 
-TEST(Eigenvalues, AreThoseOfKnownMatrices) {
-  const dvec3 e = eigenvalues(diagonal(0.25, 1, 0.5));
-  EXPECT_DOUBLE_EQ(e.x, 1);
-  EXPECT_DOUBLE_EQ(e.y, 0.5);
-  EXPECT_DOUBLE_EQ(e.z, 0.25);
-  EXPECT_EQ(eigenvalues(SymMat3{}), dvec3(0));
-}
-
-TEST(Eigenvalues, OfAFlatDistributionAreOneAndTwoZeros) {
-  Rng rng(1);
-  for (int i = 0; i < 100; ++i) {
-    const dvec3 e = eigenvalues(SymMat3::outer(random_direction(rng)));
-    EXPECT_NEAR(e.x, 1, 1e-6);
-    EXPECT_NEAR(e.y, 0, 1e-7);
-    EXPECT_NEAR(e.z, 0, 1e-7);
-  }
-}
-
-TEST(Eigenvalues, KeepTraceAndSquaredNormOfAnyMatrix) {
-  Rng rng(2);
-  for (int i = 0; i < 1000; ++i) {
-    SymMat3 s;
-    for (int k = 0; k < 3; ++k) s += SymMat3::outer(random_direction(rng)) * rng.next();
-    const dvec3 e = eigenvalues(s);
-    const double norm2 = double(s.xx) * s.xx + double(s.yy) * s.yy + double(s.zz) * s.zz +
-                         2 * (double(s.xy) * s.xy + double(s.xz) * s.xz + double(s.yz) * s.yz);
-    EXPECT_NEAR(e.x + e.y + e.z, s.trace(), 1e-6);
-    EXPECT_NEAR(glm::dot(e, e), norm2, 1e-6);
-    EXPECT_TRUE(e.x >= e.y && e.y >= e.z && e.z >= 0);
-  }
-}
-
 TEST(OpticalDepthOfHits, IsTheLogOfTheShareThatGetsThrough) {
   EXPECT_EQ(optical_depth_of_hits(0, 200), 0);
   EXPECT_NEAR(optical_depth_of_hits(100, 200), std::log(2.0), 1e-12);

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// Layout of OUT.partial:
+//   volume_KEY.ffl   packed volumes; KEY is the hash of everything that the volume depends on, so no other check of
+//                    options or versions is needed to use one again
+//   asset/           the asset in the making; becomes OUT by a rename
+#include "prefilter/bake_workspace.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <stdio.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+#include "base/hash.h"
+#include "cache/level_file.h"
+
+namespace farfield {
+namespace {
+
+namespace fs = std::filesystem;
+
+tl::unexpected<Error> io_error(const char* verb, const fs::path& path, const char* reason) {
+  return make_error(ErrorCode::Io, fmt::format("{}: cannot {}: {}", path.string(), verb, reason));
+}
+tl::unexpected<Error> io_error(const char* verb, const fs::path& path, const std::error_code& error) {
+  return io_error(verb, path, error.message().c_str());
+}
+
+/// "a/b.farfield" of "a/b.farfield/": the name that a rename needs.
+fs::path without_trailing_slash(const fs::path& path) {
+  fs::path normal = fs::absolute(path).lexically_normal();
+  return normal.has_filename() ? normal : normal.parent_path();
+}
+
+/// Whether a bake may replace what is at `out`.
+bool is_replaceable(const fs::path& out) {
+  std::error_code error;
+  const fs::file_status status = fs::symlink_status(out, error);
+  if (status.type() == fs::file_type::not_found) return true;
+  if (status.type() != fs::file_type::directory) return false;
+  return fs::exists(out / "manifest.json", error) || fs::is_empty(out, error);
+}
+
+/// Swaps two folders in one step where the file system can; otherwise moves one aside first.
+int exchange(const fs::path& staged, const fs::path& out, const fs::path& aside) {
+  if (renameat2(AT_FDCWD, staged.c_str(), AT_FDCWD, out.c_str(), RENAME_EXCHANGE) == 0) return 0;
+  if (errno != EINVAL && errno != ENOSYS) return -1;
+  if (::rename(out.c_str(), aside.c_str()) != 0) return -1;
+  if (::rename(staged.c_str(), out.c_str()) == 0) return 0;
+  const int reason = errno;
+  (void)::rename(aside.c_str(), out.c_str());
+  errno = reason;
+  return -1;
+}
+
+}  // namespace
+
+BakeWorkspace::BakeWorkspace(fs::path out, fs::path folder, int lock)
+    : out_(std::move(out)), folder_(std::move(folder)), lock_(lock) {}
+
+BakeWorkspace::BakeWorkspace(BakeWorkspace&& other) noexcept
+    : out_(std::move(other.out_)), folder_(std::move(other.folder_)), lock_(std::exchange(other.lock_, -1)) {}
+
+BakeWorkspace::~BakeWorkspace() {
+  if (lock_ < 0) return;
+  std::error_code ignored;
+  fs::remove_all(asset_dir(), ignored);
+  fs::remove(folder_, ignored);  // only if no volume is in it
+  ::close(lock_);
+}
+
+Result<BakeWorkspace> BakeWorkspace::open(const fs::path& out_path) {
+  const fs::path out = without_trailing_slash(out_path);
+  if (!is_replaceable(out)) {
+    return make_error(
+        ErrorCode::InvalidArgument,
+        fmt::format("{}: exists and is not a baked asset; remove it or choose another name", out.string()));
+  }
+  fs::path folder = out;
+  folder += ".partial";
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return io_error("create", folder, error);
+  const int lock = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (lock < 0) return io_error("open", folder, std::strerror(errno));
+  if (::flock(lock, LOCK_EX | LOCK_NB) != 0) {
+    ::close(lock);
+    return make_error(ErrorCode::InvalidArgument,
+                      fmt::format("{}: another bake of this asset is running; wait for it", out.string()));
+  }
+  BakeWorkspace workspace(out, folder, lock);
+  fs::remove_all(workspace.asset_dir(), error);  // of an interrupted bake
+  if (!error) fs::create_directory(workspace.asset_dir(), error);
+  if (error) return io_error("create", workspace.asset_dir(), error);
+  return workspace;
+}
+
+fs::path BakeWorkspace::volume_path(uint64_t key) const { return folder_ / ("volume_" + to_hex(key) + ".ffl"); }
+
+std::optional<LevelData> BakeWorkspace::load_volume(uint64_t key) const {
+  const auto file = LevelFile::open(volume_path(key), LevelCheck::Full);
+  if (!file) return std::nullopt;
+  const LevelView& view = (*file)->view();
+  LevelData volume;
+  volume.header = view.header;
+  const auto copy = [](const auto& from, auto& to) { to.assign(from.begin(), from.end()); };
+  copy(view.brick_table, volume.brick_table);
+  copy(view.bricks, volume.bricks);
+  copy(view.voxel_sggx, volume.voxel_sggx);
+  copy(view.voxel_diffuse, volume.voxel_diffuse);
+  copy(view.voxel_specular, volume.voxel_specular);
+  copy(view.voxel_roughness2, volume.voxel_roughness2);
+  copy(view.voxel_transmission, volume.voxel_transmission);
+  copy(view.voxel_self_shadowing, volume.voxel_self_shadowing);
+  return volume;
+}
+
+Result<void> BakeWorkspace::store_volume(uint64_t key, const LevelData& volume) const {
+  const auto written = write_level(volume_path(key), volume);
+  if (!written) return tl::unexpected<Error>(written.error());
+  return {};
+}
+
+Result<void> BakeWorkspace::publish() {
+  std::error_code error;
+  const fs::path aside = folder_ / "previous";
+  const int renamed =
+      fs::exists(out_, error) ? exchange(asset_dir(), out_, aside) : ::rename(asset_dir().c_str(), out_.c_str());
+  if (renamed != 0) return io_error("move the finished asset here", out_, std::strerror(errno));
+  fs::remove_all(folder_, error);  // what is left is waste; that it could not be removed spoils nothing
+  ::close(lock_);
+  lock_ = -1;
+  return {};
+}
+
+}  // namespace farfield

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a bake works until its asset is complete: a folder OUT.partial beside OUT. Nothing half-written ever bears the
+// final name, and what was slow to compute survives an interruption.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+
+#include "base/result.h"
+#include "cache/level.h"
+
+namespace farfield {
+
+/// The working folder of one bake; locked, so that two bakes of one asset do not mix. When it goes without publish(),
+/// it keeps the stored volumes and removes the rest. One thread at a time.
+class BakeWorkspace {
+ public:
+  /// Creates or finds OUT.partial. Errors: InvalidArgument (OUT is something else than a baked asset or an empty
+  /// folder, which a bake must not replace; another bake of it is running), Io.
+  static Result<BakeWorkspace> open(const std::filesystem::path& out);
+  BakeWorkspace(BakeWorkspace&& other) noexcept;
+  BakeWorkspace& operator=(BakeWorkspace&&) = delete;
+  ~BakeWorkspace();
+
+  /// Where the asset's files are to be written; empty at first.
+  std::filesystem::path asset_dir() const { return folder_ / "asset"; }
+
+  /// The packed volume that an earlier bake stored under the key; nothing if there is none or it is damaged.
+  std::optional<LevelData> load_volume(uint64_t key) const;
+  /// Stores a packed volume (pack_volume, not empty) for a later bake. Errors: Io.
+  Result<void> store_volume(uint64_t key, const LevelData& volume) const;
+
+  /// Makes asset_dir() the asset OUT, in one step also where OUT exists, and removes the workspace. Errors: Io; the
+  /// asset that was at OUT is then untouched.
+  Result<void> publish();
+
+ private:
+  BakeWorkspace(std::filesystem::path out, std::filesystem::path folder, int lock);
+  std::filesystem::path volume_path(uint64_t key) const;
+
+  std::filesystem::path out_;
+  std::filesystem::path folder_;
+  int lock_ = -1;  ///< descriptor of folder_, locked; -1: moved from or published
+};
+
+}  // namespace farfield
