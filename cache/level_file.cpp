@@ -36,18 +36,29 @@ struct FileRange {
   uint64_t end = 0;
 };
 
-/// The whole pages inside the positions and the quads, which lie one after the other.
-FileRange build_only_pages(const LevelLayout& layout) {
-  FileRange range;
+bool is_load_only(SectionId id) {
+  return id == SectionId::Positions || id == SectionId::Quads || id == SectionId::MorphVertex ||
+         id == SectionId::MorphFace;
+}
+
+/// The whole pages that hold only sections which rays do not read: positions and quads at the file's beginning, morph
+/// maps at its end.
+std::vector<FileRange> build_only_pages(const LevelLayout& layout) {
+  std::vector<FileRange> ranges;
+  bool extend_last = false;
   for (const SectionEntry& section : layout.sections) {
-    const auto id = static_cast<SectionId>(section.id);
-    if (id != SectionId::Positions && id != SectionId::Quads) continue;
-    if (range.begin == 0) range.begin = section.offset;
-    range.end = section.offset + section.bytes;
+    const bool load_only = is_load_only(static_cast<SectionId>(section.id));
+    if (load_only && !extend_last) ranges.push_back({section.offset, 0});
+    if (load_only) ranges.back().end = section.offset + section.bytes;
+    extend_last = load_only;
   }
-  range.begin = (range.begin + kPageBytes - 1) / kPageBytes * kPageBytes;
-  range.end = range.end / kPageBytes * kPageBytes;
-  return range.begin < range.end ? range : FileRange{};
+  for (FileRange& range : ranges) {
+    const uint64_t mapped_end = (layout.file_bytes + kPageBytes - 1) / kPageBytes * kPageBytes;
+    range.begin = (range.begin + kPageBytes - 1) / kPageBytes * kPageBytes;
+    range.end = range.end == layout.file_bytes ? mapped_end : range.end / kPageBytes * kPageBytes;
+  }
+  std::erase_if(ranges, [](const FileRange& range) { return range.begin >= range.end; });
+  return ranges;
 }
 
 }  // namespace
@@ -81,9 +92,9 @@ Result<uint64_t> write_level(const std::filesystem::path& path, const LevelData&
 
 LevelFileSizes level_file_sizes(const LevelView& level) {
   const LevelLayout layout = layout_of(level);
-  const FileRange build_only = build_only_pages(layout);
-  return {layout.file_bytes, (layout.file_bytes + kPageBytes - 1) / kPageBytes * kPageBytes,
-          build_only.end - build_only.begin};
+  uint64_t build_only = 0;
+  for (const FileRange& range : build_only_pages(layout)) build_only += range.end - range.begin;
+  return {layout.file_bytes, (layout.file_bytes + kPageBytes - 1) / kPageBytes * kPageBytes, build_only};
 }
 
 Result<std::unique_ptr<LevelFile>> LevelFile::open(const std::filesystem::path& path, LevelCheck check) {
@@ -114,10 +125,10 @@ LevelFile::~LevelFile() {
 uint64_t LevelFile::build_only_bytes() const { return level_file_sizes(view_).build_only_bytes; }
 
 void LevelFile::release_build_pages() const {
-  const FileRange pages = build_only_pages(layout_of(view_));
-  if (pages.end == pages.begin) return;
-  // A failure (pages locked by the host, a system with larger pages) only means that the memory stays in use.
-  ::madvise(const_cast<std::byte*>(map_) + pages.begin, pages.end - pages.begin, MADV_DONTNEED);
+  for (const FileRange& pages : build_only_pages(layout_of(view_))) {
+    // A failure (pages locked by the host, a system with larger pages) only means that the memory stays in use.
+    ::madvise(const_cast<std::byte*>(map_) + pages.begin, pages.end - pages.begin, MADV_DONTNEED);
+  }
 }
 
 }  // namespace farfield

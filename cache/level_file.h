@@ -41,7 +41,8 @@ class LevelFile {
 
   const LevelView& view() const { return view_; }
   uint64_t file_bytes() const { return map_bytes_; }
-  /// Bytes of the whole pages that hold only positions and quads, which only a BVH build reads.
+  /// Bytes of the whole pages that hold only positions and quads, which only a BVH build reads, and morph maps, which
+  /// rays that dissolve between levels do not read.
   uint64_t build_only_bytes() const;
   /// Gives those pages back to the system; they return from disk if touched again. Any thread.
   void release_build_pages() const;

@@ -42,18 +42,19 @@ Result<LoadedItem> run_load(const std::function<Result<LoadedItem>()>& load) {
 
 }  // namespace
 
-Residency::Residency(uint64_t budget_bytes, Report report) : budget_bytes_(budget_bytes), report_(std::move(report)) {}
+ResidentSet::ResidentSet(uint64_t budget_bytes, Report report)
+    : budget_bytes_(budget_bytes), report_(std::move(report)) {}
 
-Residency::~Residency() = default;
+ResidentSet::~ResidentSet() = default;
 
-size_t Residency::add(ResidencyItem item) {
+size_t ResidentSet::add(ResidencyItem item) {
   FARFIELD_CHECK(item.load != nullptr);
   const std::lock_guard lock(mutex_);
   items_.emplace_back().planned = std::move(item);
   return items_.size() - 1;
 }
 
-const Resident* Residency::acquire_slowly(size_t index) {
+const Resident* ResidentSet::acquire_slowly(size_t index) {
   Item& item = items_[index];
   if (item.state.load(std::memory_order_acquire) == ItemState::Broken) return nullptr;  // rays ask often: no lock
   std::unique_lock lock(mutex_);
@@ -65,7 +66,7 @@ const Resident* Residency::acquire_slowly(size_t index) {
   return item.object.get();
 }
 
-void Residency::load(size_t index, std::unique_lock<std::mutex>& lock) {
+void ResidentSet::load(size_t index, std::unique_lock<std::mutex>& lock) {
   Item& item = items_[index];
   is_loading_ = true;
   item.state.store(ItemState::Loading, std::memory_order_relaxed);
@@ -93,7 +94,7 @@ void Residency::load(size_t index, std::unique_lock<std::mutex>& lock) {
 }
 
 /// Counts the item's planned bytes before it is loaded.
-Result<void> Residency::reserve(Item& item) {
+Result<void> ResidentSet::reserve(Item& item) {
   const uint64_t planned = saturating_add(item.planned.resident_bytes, item.planned.build_peak_bytes);
   const uint64_t total = saturating_add(stats_.accounted_bytes, planned);
   if (total > budget_bytes_) {
@@ -110,7 +111,7 @@ Result<void> Residency::reserve(Item& item) {
 }
 
 /// Replaces the plan by what the load took, and decides whether the item is Ready or Broken.
-Result<void> Residency::settle(Item& item, Result<LoadedItem>& loaded) {
+Result<void> ResidentSet::settle(Item& item, Result<LoadedItem>& loaded) {
   Result<void> outcome;
   if (loaded) {
     outcome = account(item, *loaded);
@@ -131,7 +132,7 @@ Result<void> Residency::settle(Item& item, Result<LoadedItem>& loaded) {
   return {};
 }
 
-Result<void> Residency::account(Item& item, const LoadedItem& loaded) {
+Result<void> ResidentSet::account(Item& item, const LoadedItem& loaded) {
   const uint64_t with_item = saturating_add(stats_.accounted_bytes, loaded.resident_bytes);
   const uint64_t worst = saturating_add(with_item, loaded.build_peak_bytes);
   stats_.peak_accounted_bytes = std::max(stats_.peak_accounted_bytes, worst);
@@ -152,7 +153,7 @@ Result<void> Residency::account(Item& item, const LoadedItem& loaded) {
   return {};
 }
 
-void Residency::release(std::span<const size_t> items) {
+void ResidentSet::release(std::span<const size_t> items) {
   std::vector<std::unique_ptr<Resident>> dropped;
   uint64_t dropped_bytes = 0;
   {
@@ -180,24 +181,24 @@ void Residency::release(std::span<const size_t> items) {
   stats_.accounted_bytes -= dropped_bytes;
 }
 
-uint64_t Residency::resident_bytes(size_t item) const {
+uint64_t ResidentSet::resident_bytes(size_t item) const {
   const std::lock_guard lock(mutex_);
   return items_[item].planned.resident_bytes;
 }
 
-uint64_t Residency::build_peak_bytes(size_t item) const {
+uint64_t ResidentSet::build_peak_bytes(size_t item) const {
   const std::lock_guard lock(mutex_);
   return items_[item].planned.build_peak_bytes;
 }
 
-void Residency::set_other_bytes(uint64_t bytes) {
+void ResidentSet::set_other_bytes(uint64_t bytes) {
   const std::lock_guard lock(mutex_);
   stats_.accounted_bytes = saturating_add(stats_.accounted_bytes - other_bytes_, bytes);
   other_bytes_ = bytes;
   stats_.peak_accounted_bytes = std::max(stats_.peak_accounted_bytes, stats_.accounted_bytes + reserved_bytes_);
 }
 
-ResidencyStats Residency::stats() const {
+ResidencyStats ResidentSet::stats() const {
   const std::lock_guard lock(mutex_);
   ResidencyStats snapshot = stats_;
   snapshot.accounted_bytes = saturating_add(stats_.accounted_bytes, reserved_bytes_);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Residency: loadable items under a hard budget of bytes. Knows neither Embree nor levels: an item is two planned sizes
-// and a function that loads it.
+// ResidentSet: loadable items under a hard budget of bytes. Knows neither Embree nor levels: an item is two planned
+// sizes and a function that loads it.
 //
-// Who owns. The Residency owns every loaded object and destroys it in release() or at its end. acquire() lends it:
+// Who owns. The ResidentSet owns every loaded object and destroys it in release() or at its end. acquire() lends it:
 //   a borrowed object stays valid until the item is released. Items are never removed.
 // Who counts. accounted_bytes() = other bytes (set_other_bytes) + actual bytes of Ready items + planned bytes of the
 //   item being loaded, build peak included, which are reserved before its load starts. One load runs at a time, so one
@@ -71,15 +71,15 @@ struct ResidencyStats {
 
 /// Thread rule: acquire, try_acquire, state and stats are safe from any thread. add, release and the setters are for
 /// one thread at a time with no acquire() running and no borrowed object of a released item in use (between frames).
-class Residency {
+class ResidentSet {
  public:
   /// report: called once for each item that breaks, never concurrently, not under the lock; must not call back.
   using Report = std::function<void(size_t item, const Error& error)>;
 
-  explicit Residency(uint64_t budget_bytes, Report report = {});
-  ~Residency();
-  Residency(const Residency&) = delete;
-  Residency& operator=(const Residency&) = delete;
+  explicit ResidentSet(uint64_t budget_bytes, Report report = {});
+  ~ResidentSet();
+  ResidentSet(const ResidentSet&) = delete;
+  ResidentSet& operator=(const ResidentSet&) = delete;
 
   /// Adds an item, Empty. Returns its number: 0, 1, 2, ...
   size_t add(ResidencyItem item);

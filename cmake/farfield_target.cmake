@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 # One way to declare a room, a test and a bench, so that every target has the same warnings and language level.
 
+# farfield_configure(TARGET [STANDARD]): our own files are C++20; STANDARD (cxx_std_20) is what its users need.
 function(farfield_configure target)
-  target_compile_features(${target} PUBLIC cxx_std_20)
+  set(standard cxx_std_20)
+  if(ARGC GREATER 1)
+    set(standard ${ARGV1})
+  endif()
+  target_compile_features(${target} PRIVATE cxx_std_20 INTERFACE ${standard})
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON
                         CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion

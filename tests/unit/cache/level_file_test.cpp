@@ -84,6 +84,16 @@ TEST(LevelFile, SizesAreKnownBeforeWriting) {
   EXPECT_EQ(level_file_sizes(view_of(full_level())).build_only_bytes, 0u);
 }
 
+TEST(LevelFile, MorphMapsAreGivenBackToo) {
+  LevelData level = test::random_level(6, 5000, 10);
+  const LevelFileSizes without = level_file_sizes(view_of(level));
+  level.morph_vertex.assign(10000, 0);
+  level.morph_face.assign(10000, 0);
+  const LevelFileSizes with = level_file_sizes(view_of(level));
+  EXPECT_GE(with.build_only_bytes, without.build_only_bytes + 80000 - 2 * 4096);
+  EXPECT_LE(with.build_only_bytes, with.mapped_bytes);
+}
+
 TEST(LevelFile, ReleasedBuildPagesComeBackUnchanged) {
   const TemporaryFolder folder;
   const LevelData level = test::random_level(6, 5000, 10);

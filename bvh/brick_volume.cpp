@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+// Two nested DDAs [Amanatides & Woo 1987], over bricks and over the voxels of a brick, and exact free flight in the
+// piecewise constant medium that they enumerate.
+//
+// Densities (1 byte per voxel) are read for every voxel, the 6 bytes of a voxel's SGGX matrix only where they may
+// matter: since lambda_max(S) = 1, rho |d| bounds the attenuation rho sqrt(d^T S d). So:
+//
+//   1. fly with rho |d| until a tentative collision, in some voxel V at s_c;
+//   2. fetch S of V; the collision is real with probability sigma = sqrt(d^T S d) / |d|;
+//   3. if not, V's true attenuation is known by now: the rest of V is crossed with rho |d| sigma, and its end with a
+//      fresh optical depth for the voxels behind it.
+//
+// Exponential flights have no memory, so steps 2 and 3 keep the distribution exact, and each voxel costs at most two
+// draws: nothing loops where rho is huge and sigma zero (flat flakes seen edge-on).
+//
+// Parameters: t is the caller's, s = t - t of entry into the grid. Steps are taken in s, so that they stay
+// exact for origins that are far away.
+#include "bvh/brick_volume.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/hash.h"
+
+namespace farfield {
+
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+// Six-byte matrices have eigenvalues up to 1 + 1/127 (formula notes 7.10), so sigma may reach its square root.
+constexpr float kSigmaBound = 1.00393f;
+
+/// Random numbers of one flight: a function of the seed and a counter.
+class FlightRandom {
+ public:
+  explicit FlightRandom(uint64_t seed) : seed_(seed) {}
+  float uniform() { return to_unit_float(mix64(seed_, counter_++)); }
+  float optical_depth() { return -std::log1p(-uniform()); }
+
+ private:
+  uint64_t seed_;
+  uint64_t counter_ = 0;
+};
+
+int clamped_cell(float coordinate, int count) {
+  // The negated comparison also sends NaN to 0; the conversion is in range after it.
+  if (!(coordinate > 0.0f)) return 0;
+  return coordinate < static_cast<float>(count) ? static_cast<int>(coordinate) : count - 1;
+}
+
+size_t table_index(const ivec3& cell, const ivec3& dims) {
+  return static_cast<size_t>(cell.x) +
+         static_cast<size_t>(dims.x) *
+             (static_cast<size_t>(cell.y) + static_cast<size_t>(dims.y) * static_cast<size_t>(cell.z));
+}
+
+/// The walk over the cells of one grid level: which cell, and where the ray crosses into the next along each axis.
+struct Walk {
+  ivec3 cell;
+  vec3 next;  ///< s of the next crossing; infinity along axes that the ray does not move in
+
+  /// origin: cell (0,0,0)'s lower corner on the ray's scale; side: of a cell.
+  Walk(const vec3& entry, const vec3& direction, const vec3& inverse, const vec3& origin, float side, float s_begin,
+       const ivec3& count) {
+    const vec3 p = (entry + s_begin * direction - origin) / side;
+    for (int axis = 0; axis < 3; ++axis) {
+      cell[axis] = clamped_cell(p[axis], count[axis]);
+      const float plane = origin[axis] + side * static_cast<float>(cell[axis] + (direction[axis] > 0.0f ? 1 : 0));
+      next[axis] = std::isinf(inverse[axis]) ? kInfinity : (plane - entry[axis]) * inverse[axis];
+    }
+  }
+  float exit() const { return std::min(next.x, std::min(next.y, next.z)); }
+  /// Goes to the next cell; selects instead of branches and indices [measured: 1.3-1.6x]. False: outside the grid.
+  bool step(const ivec3& sign, const vec3& delta, const ivec3& count) {
+    const bool along_x = next.x <= next.y && next.x <= next.z;
+    const bool along_y = !along_x && next.y <= next.z;
+    const bool along_z = !along_x && !along_y;
+    cell.x += along_x ? sign.x : 0;
+    cell.y += along_y ? sign.y : 0;
+    cell.z += along_z ? sign.z : 0;
+    next.x += along_x ? delta.x : 0.0f;
+    next.y += along_y ? delta.y : 0.0f;
+    next.z += along_z ? delta.z : 0.0f;
+    const auto inside = [](int i, int n) { return static_cast<unsigned>(i) < static_cast<unsigned>(n); };
+    return inside(cell.x, count.x) & inside(cell.y, count.y) & inside(cell.z, count.z);
+  }
+};
+
+}  // namespace
+
+RayRange clip_to_box(const LocalRay& ray, const Box3& box) {
+  float t_near = ray.t_near;
+  float t_far = ray.t_far;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float o = ray.origin[axis];
+    const float inverse = 1.0f / ray.direction[axis];
+    if (std::isinf(inverse)) {  // zero, or so little that it never crosses anything
+      if (!(o >= box.lower[axis] && o <= box.upper[axis])) return {1.0f, 0.0f};
+      continue;
+    }
+    const float a = (box.lower[axis] - o) * inverse;
+    const float b = (box.upper[axis] - o) * inverse;
+    if (!(a == a && b == b)) return {1.0f, 0.0f};
+    t_near = std::max(t_near, std::min(a, b));
+    t_far = std::min(t_far, std::max(a, b));
+  }
+  return {t_near, t_far};
+}
+
+/// A ray's way through the grid; lengths in voxels.
+struct BrickVolume::Flight {
+  vec3 entry;           ///< where s = 0
+  vec3 direction;       ///< per unit of t
+  vec3 inverse;         ///< 1 / direction
+  ivec3 sign;           ///< of direction
+  vec3 delta;           ///< s between crossings of voxel planes; infinity along axes that the ray does not move in
+  vec3 unit_direction;  ///< of the ray in local space
+  float speed;          ///< |local direction|: scene units per unit of t
+  float depth_left;     ///< optical depth until the next tentative collision
+  FlightRandom random;
+  float s_hit = 0;
+  uint32_t payload_hit = 0;
+};
+
+BrickVolume::BrickVolume(const LevelView& level)
+    : brick_table_(level.brick_table),
+      bricks_(level.bricks),
+      voxel_sggx_(level.voxel_sggx),
+      brick_dims_(level.header.brick_dims),
+      origin_(level.header.volume_origin),
+      inverse_voxel_size_(1.0f / level.header.resolution) {}
+
+float BrickVolume::projected_area(uint32_t payload, const vec3& unit_direction) const {
+  return std::sqrt(std::max(0.0f, unpack(voxel_sggx_[payload]).quadratic(unit_direction)));
+}
+
+bool BrickVolume::cross_brick(Flight& flight, const Brick& brick, const ivec3& brick_cell, float s_begin,
+                              float s_end) const {
+  static const ivec3 kSide(kBrickSide);
+  const float bound = voxel_sggx_.empty() ? 1.0f : kSigmaBound;
+  const float rate_per_density = brick.density_scale * (1.0f / 255.0f) * flight.speed;  // of true attenuation, per s
+  const vec3 corner = vec3(brick_cell * kBrickSide);
+  Walk walk(flight.entry, flight.direction, flight.inverse, corner, 1.0f, s_begin, kSide);
+  for (float s = s_begin;;) {
+    const float s_next = std::min(walk.exit(), s_end);
+    const int voxel = walk.cell.x + kBrickSide * (walk.cell.y + kBrickSide * walk.cell.z);
+    const uint8_t density = brick.density[static_cast<size_t>(voxel)];
+    if (density != 0 && s_next > s) {
+      const float rate = static_cast<float>(density) * rate_per_density * bound;
+      const float depth = rate * (s_next - s);
+      if (depth < flight.depth_left) {
+        flight.depth_left -= depth;
+      } else {
+        flight.s_hit = s + flight.depth_left / rate;
+        flight.payload_hit = brick.payload_index(voxel);
+        if (voxel_sggx_.empty()) return true;
+        const float acceptance = projected_area(flight.payload_hit, flight.unit_direction) / bound;
+        if (flight.random.uniform() < acceptance) return true;
+        const float depth_true = flight.random.optical_depth();
+        if (depth_true < rate * acceptance * (s_next - flight.s_hit)) {
+          flight.s_hit += depth_true / (rate * acceptance);
+          return true;
+        }
+        flight.depth_left = flight.random.optical_depth();
+      }
+    }
+    if (s_next >= s_end || !walk.step(flight.sign, flight.delta, kSide)) return false;
+    s = std::max(s, s_next);
+  }
+}
+
+std::optional<VolumeHit> BrickVolume::first_collision(const LocalRay& ray, uint64_t seed) const {
+  if (is_empty()) return std::nullopt;
+  const LocalRay in_voxels{(ray.origin - origin_) * inverse_voxel_size_, ray.direction * inverse_voxel_size_,
+                           ray.t_near, ray.t_far};
+  const RayRange range = clip_to_box(in_voxels, Box3{vec3(0.0f), vec3(brick_dims_ * kBrickSide)});
+  if (range.is_empty() || !std::isfinite(range.t_far)) return std::nullopt;  // an infinite range has no direction
+
+  const float speed = glm::length(ray.direction);
+  if (!(speed > 0.0f && speed < kInfinity)) return std::nullopt;
+  const vec3& d = in_voxels.direction;
+  const auto sign = [](float x) { return x > 0.0f ? 1 : -1; };
+  Flight flight{in_voxels.origin + range.t_near * d,
+                d,
+                1.0f / d,
+                {sign(d.x), sign(d.y), sign(d.z)},
+                glm::abs(1.0f / d),
+                ray.direction / speed,
+                speed,
+                0.0f,
+                FlightRandom(seed)};
+  flight.depth_left = flight.random.optical_depth();
+
+  const float s_end = range.t_far - range.t_near;
+  const vec3 brick_delta = flight.delta * static_cast<float>(kBrickSide);
+  Walk walk(flight.entry, flight.direction, flight.inverse, vec3(0.0f), static_cast<float>(kBrickSide), 0.0f,
+            brick_dims_);
+  for (float s = 0.0f;;) {
+    const float s_next = std::min(walk.exit(), s_end);
+    const uint32_t brick = brick_table_[table_index(walk.cell, brick_dims_)];
+    if (brick != kNoBrick && s_next > s && cross_brick(flight, bricks_[brick], walk.cell, s, s_next)) {
+      return VolumeHit{std::min(range.t_near + flight.s_hit, range.t_far), flight.payload_hit};
+    }
+    if (s_next >= s_end || !walk.step(flight.sign, brick_delta, brick_dims_)) return std::nullopt;
+    s = std::max(s, s_next);
+  }
+}
+
+}  // namespace farfield

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Free flights through a level's brick volume.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "base/vec.h"
+#include "cache/level.h"
+
+namespace farfield {
+
+/// A collision with a flake.
+struct VolumeHit {
+  float t;           ///< ray parameter
+  uint32_t payload;  ///< index into the voxel sections
+};
+
+/// A ray in the local space of a level: points origin + t * direction, t in [t_near, t_far]. The direction need not be
+/// unit: what a world ray of unit direction becomes under the instance's transform.
+struct LocalRay {
+  vec3 origin;
+  vec3 direction;
+  float t_near;
+  float t_far;
+};
+
+/// Where along the ray the box lies: [t_near, t_far] cut to it; empty (t_near > t_far) if the ray misses it. NaN in the
+/// ray gives an empty range.
+struct RayRange {
+  float t_near;
+  float t_far;
+  bool is_empty() const { return !(t_near <= t_far); }
+};
+RayRange clip_to_box(const LocalRay& ray, const Box3& box);
+
+/// The microflake volume of a level, as rays see it. Refers to the level's arrays. Immutable; any thread.
+class BrickVolume {
+ public:
+  BrickVolume() = default;
+  explicit BrickVolume(const LevelView& level);
+
+  bool is_empty() const { return bricks_.empty(); }
+
+  /// Draws the first collision in [t_near, t_far], or none. Exact for the piecewise constant medium:
+  /// P(no collision before t) = exp(-integral of rho sqrt(d^T S d) dt), d the unnormalised direction. That integral is
+  /// the same in every space that an affine map leads to, so instances keep their transmittance under any transform
+  /// (the flakes are carried along). A pure function of the arguments: the same seed gives the same collision, whatever
+  /// t_far beyond it. Zero direction, NaN or infinite origins: none.
+  std::optional<VolumeHit> first_collision(const LocalRay& ray, uint64_t seed) const;
+
+ private:
+  struct Flight;
+  bool cross_brick(Flight& flight, const Brick& brick, const ivec3& brick_cell, float s_begin, float s_end) const;
+  /// sqrt(d^T S d) / |d| of the voxel, d the ray's direction.
+  float projected_area(uint32_t payload, const vec3& unit_direction) const;
+
+  ArrayView<uint32_t> brick_table_;
+  ArrayView<Brick> bricks_;
+  ArrayView<PackedFlakeSggx> voxel_sggx_;
+  ivec3 brick_dims_{0};
+  vec3 origin_{0.0f};
+  float inverse_voxel_size_ = 0;
+};
+
+}  // namespace farfield

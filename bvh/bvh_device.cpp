@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bvh/bvh_device.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <string>
+#include <thread>
+
+namespace farfield {
+
+bool BvhDevice::on_memory(void* self, ssize_t bytes, bool /*post*/) {
+  auto& device = *static_cast<BvhDevice*>(self);
+  const int64_t now = device.bytes_.fetch_add(bytes, std::memory_order_relaxed) + bytes;
+  int64_t peak = device.peak_bytes_.load(std::memory_order_relaxed);
+  while (now > peak && !device.peak_bytes_.compare_exchange_weak(peak, now, std::memory_order_relaxed)) {
+  }
+  return true;  // a veto would leave Embree's own sum wrong for ever; budgets are checked before a build starts
+}
+
+Result<std::unique_ptr<BvhDevice>> BvhDevice::create() {
+  // Embree installs a TBB limit of the largest "threads" among live devices, and none at all if one has the default.
+  const size_t limit = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+  const bool limited = limit < std::thread::hardware_concurrency();
+  const std::string config = limited ? fmt::format("threads={}", limit) : std::string();
+
+  std::unique_ptr<BvhDevice> device(new BvhDevice);
+  device->device_ = rtcNewDevice(config.c_str());
+  if (!device->device_) {
+    return make_error(ErrorCode::Unsupported, fmt::format("Embree does not start on this machine (error {})",
+                                                          static_cast<int>(rtcGetDeviceError(nullptr))));
+  }
+  rtcSetDeviceMemoryMonitorFunction(device->device_, on_memory, device.get());
+  return device;
+}
+
+BvhDevice::~BvhDevice() {
+  if (device_) rtcReleaseDevice(device_);
+}
+
+}  // namespace farfield

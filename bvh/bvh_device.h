@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Our own Embree device, which counts every byte that Embree holds for levels.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+
+#include "base/result.h"
+
+namespace farfield {
+
+/// An Embree device with a memory monitor. Not the host's: a device has one monitor slot, and the host may use its own.
+/// Builds are serialised by build_mutex(), so that bytes can be told apart and only one build peak exists at a time.
+class BvhDevice {
+ public:
+  /// Keeps the number of TBB threads that the process is limited to now: a default device would lift the limit.
+  /// Errors: Unsupported (Embree does not start).
+  static Result<std::unique_ptr<BvhDevice>> create();
+  ~BvhDevice();
+  BvhDevice(const BvhDevice&) = delete;
+  BvhDevice& operator=(const BvhDevice&) = delete;
+
+  RTCDevice handle() const { return device_; }
+  std::mutex& build_mutex() { return build_mutex_; }
+
+  /// Bytes that Embree has reported for this device and not given back.
+  uint64_t bytes() const { return static_cast<uint64_t>(bytes_.load(std::memory_order_relaxed)); }
+  /// The largest bytes() since reset_peak().
+  uint64_t peak_bytes() const { return static_cast<uint64_t>(peak_bytes_.load(std::memory_order_relaxed)); }
+  void reset_peak() { peak_bytes_.store(bytes_.load(std::memory_order_relaxed), std::memory_order_relaxed); }
+
+ private:
+  BvhDevice() = default;
+  static bool on_memory(void* self, ssize_t bytes, bool post);
+
+  RTCDevice device_ = nullptr;
+  std::mutex build_mutex_;
+  // relaxed: only counters; whoever compares them holds build_mutex_ and has joined the build's threads.
+  std::atomic<int64_t> bytes_{0};
+  std::atomic<int64_t> peak_bytes_{0};
+};
+
+}  // namespace farfield

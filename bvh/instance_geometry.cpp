@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: Apache-2.0
+// The callbacks, and what Embree 3.13 demands of them:
+//
+// * Single rays (N == 1) are transformed in place and traced with the caller's own context: args->rayhit is the
+//   caller's RTCRayHit, and a fresh context would lose the host's RayContext. Within packets (N > 1) rays are copies.
+// * The direction is not normalised, so t means the same inside and outside and tnear/tfar need no change.
+// * A nested hit writes the nested scene's ids, and may do so without shrinking tfar (equal distances). So geomID is
+//   set aside before the nested call, and what it is afterwards tells whether there was a hit.
+// * context->instID is left alone: Debian's Embree has one instance level and asserts on.
+// * occluded reports by tfar = -infinity.
+// * Debian's Embree has its assertions on: a ray with a NaN or a coordinate beyond 1.8e18 stops the process. Hosts see
+// to
+//   that in world space; what an extreme transform makes of a ray is checked here.
+#include "bvh/instance_geometry.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+#include "base/check.h"
+#include "base/hash.h"
+
+namespace farfield {
+
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+// World bounds grow by this fraction of their size and of their distance from the origin: the transform of a ray there
+// rounds by a few times 2^-24 of the coordinates it adds up.
+constexpr float kRelativePad = 1e-6f;
+// How much the range in which a ray meets an instance's local bounds is widened: rounding of the slab test.
+constexpr float kRangePad = 1e-6f;
+// The largest coordinate that Embree takes.
+constexpr float kEmbreeLargest = 1.8e18f;
+
+vec3 origin_of(const RTCRay& ray) { return {ray.org_x, ray.org_y, ray.org_z}; }
+vec3 direction_of(const RTCRay& ray) { return {ray.dir_x, ray.dir_y, ray.dir_z}; }
+
+/// Puts a ray into local space, and back at the end of the scope. Lanes 3 (tnear, time) stay as they are.
+class InLocalSpace {
+ public:
+  InLocalSpace(RTCRay& ray, const LocalRay& local) : ray_(ray), origin_(origin_of(ray)), direction_(direction_of(ray)) {
+    set(local.origin, local.direction);
+  }
+  ~InLocalSpace() { set(origin_, direction_); }
+  InLocalSpace(const InLocalSpace&) = delete;
+  InLocalSpace& operator=(const InLocalSpace&) = delete;
+
+ private:
+  void set(const vec3& origin, const vec3& direction) {
+    ray_.org_x = origin.x, ray_.org_y = origin.y, ray_.org_z = origin.z;
+    ray_.dir_x = direction.x, ray_.dir_y = direction.y, ray_.dir_z = direction.z;
+  }
+  RTCRay& ray_;
+  vec3 origin_;
+  vec3 direction_;
+};
+
+/// rtcIntersect1 that says whether it found something, and leaves the outer hit's ids alone if not.
+bool intersect_surface(RTCScene scene, RTCIntersectContext* context, RTCRayHit& ray_hit) {
+  const unsigned outer_id = ray_hit.hit.geomID;
+  ray_hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(scene, context, &ray_hit);
+  if (ray_hit.hit.geomID != RTC_INVALID_GEOMETRY_ID) return true;
+  ray_hit.hit.geomID = outer_id;
+  return false;
+}
+
+uint64_t flight_seed(const RayContext& context, uint32_t instance) { return mix64(context.ray_seed, instance); }
+
+glm::dmat3 linear_part(const mat4x3& m) { return {glm::dvec3(m[0]), glm::dvec3(m[1]), glm::dvec3(m[2])}; }
+
+bool is_in_range(const vec3& v) { return max_component(glm::abs(v)) <= kEmbreeLargest && is_finite(v); }
+
+bool is_in_range(const glm::dvec3& v) { return is_in_range(vec3(v)); }
+
+bool is_in_range(const glm::dmat3& m) { return is_in_range(m[0]) && is_in_range(m[1]) && is_in_range(m[2]); }
+
+}  // namespace
+
+// --- Instances -------------------------------------------------------------------------------------------------------
+
+vec3 InstanceRecord::point_to_local(const vec3& p) const {
+  const auto row = [&](const vec4& r) { return r.x * p.x + r.y * p.y + r.z * p.z + r.w; };
+  return {row(world_to_local[0]), row(world_to_local[1]), row(world_to_local[2])};
+}
+
+vec3 InstanceRecord::vector_to_local(const vec3& v) const {
+  const auto row = [&](const vec4& r) { return r.x * v.x + r.y * v.y + r.z * v.z; };
+  return {row(world_to_local[0]), row(world_to_local[1]), row(world_to_local[2])};
+}
+
+vec3 InstanceRecord::normal_to_world(const vec3& n) const {
+  return handedness * (n.x * vec3(world_to_local[0]) + n.y * vec3(world_to_local[1]) + n.z * vec3(world_to_local[2]));
+}
+
+mat3 InstanceRecord::linear_to_local() const {
+  return glm::transpose(mat3(vec3(world_to_local[0]), vec3(world_to_local[1]), vec3(world_to_local[2])));
+}
+
+Result<InstanceRecord> make_instance(uint32_t asset, const mat4x3& local_to_world) {
+  const auto invalid = [](const char* why) {
+    return make_error(ErrorCode::InvalidArgument, fmt::format("the instance's transform {}", why));
+  };
+  const glm::dmat3 linear = linear_part(local_to_world);
+  const glm::dvec3 translation(local_to_world[3]);
+  if (!is_in_range(linear) || !is_in_range(translation)) return invalid("is not finite, or beyond 1.8e18");
+  const double determinant = glm::determinant(linear);
+  const glm::dmat3 inverse = glm::inverse(linear);
+  const glm::dvec3 back = -(inverse * translation);
+  if (determinant == 0.0 || !is_in_range(inverse) || !is_in_range(back)) {
+    return invalid("cannot be inverted: give every axis a length that is not zero");
+  }
+  InstanceRecord record;
+  for (int row = 0; row < 3; ++row) {
+    record.world_to_local[static_cast<size_t>(row)] =
+        vec4(glm::dvec4(inverse[0][row], inverse[1][row], inverse[2][row], back[row]));
+  }
+  record.asset = asset;
+  record.handedness = determinant < 0.0 ? -1.0f : 1.0f;
+  return record;
+}
+
+float largest_stretch(const mat4x3& local_to_world) {
+  // The largest eigenvalue of A^T A by its trigonometric closed form [Smith 1961].
+  const glm::dmat3 a = linear_part(local_to_world);
+  const glm::dmat3 b = glm::transpose(a) * a;
+  const double mean = (b[0][0] + b[1][1] + b[2][2]) / 3.0;
+  const double off = b[1][0] * b[1][0] + b[2][0] * b[2][0] + b[2][1] * b[2][1];
+  const glm::dvec3 diagonal(b[0][0] - mean, b[1][1] - mean, b[2][2] - mean);
+  const double spread = std::sqrt((glm::dot(diagonal, diagonal) + 2.0 * off) / 6.0);
+  if (!(spread > 0.0)) return static_cast<float>(std::sqrt(mean));
+  const double half_det = glm::determinant((b - mean * glm::dmat3(1.0)) / spread) / 2.0;
+  const double angle = std::acos(std::clamp(half_det, -1.0, 1.0)) / 3.0;
+  return static_cast<float>(std::sqrt(mean + 2.0 * spread * std::cos(angle)));
+}
+
+Box3 instance_bounds(const InstanceRecord& instance, const TracedAsset& asset) {
+  // From the rounded inverse that rays really use.
+  const glm::dmat3 to_world = glm::inverse(glm::dmat3(instance.linear_to_local()));
+  const glm::dvec3 back(instance.world_to_local[0].w, instance.world_to_local[1].w, instance.world_to_local[2].w);
+  Box3 bounds;
+  const auto extend = [&](const vec3& p) { bounds.extend(vec3(to_world * (glm::dvec3(p) - back))); };
+  if (asset.hull.empty()) {
+    for (int corner = 0; corner < 8; ++corner) {
+      extend({(corner & 1) ? asset.bounds.upper.x : asset.bounds.lower.x,
+              (corner & 2) ? asset.bounds.upper.y : asset.bounds.lower.y,
+              (corner & 4) ? asset.bounds.upper.z : asset.bounds.lower.z});
+    }
+  }
+  for (const vec3& p : asset.hull) extend(p);
+  const float far = std::max(max_component(glm::abs(bounds.lower)), max_component(glm::abs(bounds.upper)));
+  const vec3 pad(kRelativePad * (max_component(bounds.size()) + far));
+  return {bounds.lower - pad, bounds.upper + pad};
+}
+
+// --- Rays ------------------------------------------------------------------------------------------------------------
+
+/// A ray that enters an instance: with which level it deals there.
+struct InstanceGeometry::Visit {
+  LocalRay ray;
+  const TracedLevel* level;
+  LevelChoice choice;
+};
+
+std::optional<InstanceGeometry::Visit> InstanceGeometry::enter(uint32_t instance, const RTCRay& ray,
+                                                               const RayContext& context) const {
+  const InstanceRecord& record = instances[instance];
+  const TracedAsset& asset = *assets[record.asset];
+  const LocalRay local{record.point_to_local(origin_of(ray)), record.vector_to_local(direction_of(ray)), ray.tnear,
+                       ray.tfar};
+  const RayRange range = clip_to_box(local, asset.bounds);
+  if (!(range.t_near * (1.0f - kRangePad) <= range.t_far * (1.0f + kRangePad))) return std::nullopt;
+
+  if (!is_in_range(local.origin) || !is_in_range(local.direction)) return std::nullopt;
+
+  const LevelChoice choice = choose_level(asset, record.footprint, instance, context, range.t_near, forced_lambda);
+  const TracedLevel* level = asset.loaded[choice.slot].load(std::memory_order_acquire);
+  if (!level) level = source_.serve(record.asset, choice.slot);
+  if (!level) return std::nullopt;
+  return Visit{local, level, choice};
+}
+
+bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, RTCRayHit& ray_hit, const RayContext& context,
+                                 RTCIntersectContext* embree_context, HitRecord* record) const {
+  const std::optional<Visit> visit = enter(instance, ray_hit.ray, context);
+  if (!visit) return false;
+  RTCRay& ray = ray_hit.ray;
+  RTCHit& hit = ray_hit.hit;
+
+  bool on_surface = false;
+  if (visit->level->scene.handle()) {
+    const InLocalSpace scope(ray, visit->ray);
+    on_surface = intersect_surface(visit->level->scene.handle(), embree_context, ray_hit);
+  }
+  LocalRay up_to_surface = visit->ray;
+  up_to_surface.t_far = ray.tfar;
+  const std::optional<VolumeHit> collision =
+      visit->level->volume.first_collision(up_to_surface, flight_seed(context, instance));
+  if (!on_surface && !collision) return false;
+
+  HitRecord made;
+  made.instance = instance;
+  made.level_slot = static_cast<uint8_t>(visit->level->slot);
+  made.lambda = visit->choice.lambda;
+  vec3 normal_world(0.0f);
+  if (collision) {
+    ray.tfar = collision->t;
+    made.is_volume = true;
+    made.element = collision->payload;
+    hit.u = hit.v = 0.0f;
+    hit.instID[0] = embree_context->instID[0];
+  } else {
+    const vec3 normal(hit.Ng_x, hit.Ng_y, hit.Ng_z);
+    made.element = 2 * hit.primID + (hit.u + hit.v > 1.0f ? 1u : 0u);
+    made.normal_local[0] = normal.x, made.normal_local[1] = normal.y, made.normal_local[2] = normal.z;
+    normal_world = instances[instance].normal_to_world(normal);
+  }
+  made.footprint = context.cone_width + context.cone_spread * ray.tfar;
+  hit.Ng_x = normal_world.x, hit.Ng_y = normal_world.y, hit.Ng_z = normal_world.z;
+  hit.geomID = geometry_id;
+  hit.primID = instance;
+  if (record) *record = made;
+  return true;
+}
+
+bool InstanceGeometry::occluded(uint32_t instance, RTCRay& ray, const RayContext& context,
+                                RTCIntersectContext* embree_context) const {
+  const std::optional<Visit> visit = enter(instance, ray, context);
+  if (!visit) return false;
+  if (visit->level->scene.handle()) {
+    const InLocalSpace scope(ray, visit->ray);
+    rtcOccluded1(visit->level->scene.handle(), embree_context, &ray);
+    if (ray.tfar < 0.0f) return true;
+  }
+  if (!visit->level->volume.first_collision(visit->ray, flight_seed(context, instance))) return false;
+  ray.tfar = -kInfinity;
+  return true;
+}
+
+// --- Embree ----------------------------------------------------------------------------------------------------------
+
+void InstanceGeometry::bounds_callback(const RTCBoundsFunctionArguments* args) {
+  const auto& self = *static_cast<const InstanceGeometry*>(args->geometryUserPtr);
+  const InstanceRecord& instance = self.instances[args->primID];
+  const Box3 bounds = instance_bounds(instance, *self.assets[instance.asset]);
+  args->bounds_o->lower_x = bounds.lower.x, args->bounds_o->upper_x = bounds.upper.x;
+  args->bounds_o->lower_y = bounds.lower.y, args->bounds_o->upper_y = bounds.upper.y;
+  args->bounds_o->lower_z = bounds.lower.z, args->bounds_o->upper_z = bounds.upper.z;
+}
+
+void InstanceGeometry::intersect_callback(const RTCIntersectFunctionNArguments* args) {
+  const auto& self = *static_cast<const InstanceGeometry*>(args->geometryUserPtr);
+  auto& context = *reinterpret_cast<RayContext*>(args->context);
+  if (args->N == 1) {
+    if (args->valid[0] == 0) return;
+    auto& ray_hit = *reinterpret_cast<RTCRayHit*>(args->rayhit);
+    self.intersect(args->primID, args->geomID, ray_hit, context, args->context, &context.hit);
+    return;
+  }
+  RTCRayN* rays = RTCRayHitN_RayN(args->rayhit, args->N);
+  RTCHitN* hits = RTCRayHitN_HitN(args->rayhit, args->N);
+  for (unsigned lane = 0; lane < args->N; ++lane) {
+    if (args->valid[lane] == 0) continue;
+    RTCRayHit ray_hit;
+    ray_hit.ray = rtcGetRayFromRayN(rays, args->N, lane);
+    ray_hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    ray_hit.hit.instID[0] = args->context->instID[0];
+    if (!self.intersect(args->primID, args->geomID, ray_hit, context, args->context, nullptr)) continue;
+    RTCRayN_tfar(rays, args->N, lane) = ray_hit.ray.tfar;
+    rtcCopyHitToHitN(hits, &ray_hit.hit, args->N, lane);
+  }
+}
+
+void InstanceGeometry::occluded_callback(const RTCOccludedFunctionNArguments* args) {
+  const auto& self = *static_cast<const InstanceGeometry*>(args->geometryUserPtr);
+  const auto& context = *reinterpret_cast<const RayContext*>(args->context);
+  if (args->N == 1) {
+    if (args->valid[0] == 0) return;
+    self.occluded(args->primID, *reinterpret_cast<RTCRay*>(args->ray), context, args->context);
+    return;
+  }
+  for (unsigned lane = 0; lane < args->N; ++lane) {
+    if (args->valid[lane] == 0) continue;
+    RTCRay ray = rtcGetRayFromRayN(args->ray, args->N, lane);
+    if (self.occluded(args->primID, ray, context, args->context)) RTCRayN_tfar(args->ray, args->N, lane) = -kInfinity;
+  }
+}
+
+RTCGeometry InstanceGeometry::create(RTCDevice device) {
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserData(geometry, this);
+  rtcSetGeometryBoundsFunction(geometry, bounds_callback, nullptr);
+  rtcSetGeometryIntersectFunction(geometry, intersect_callback);
+  rtcSetGeometryOccludedFunction(geometry, occluded_callback);
+  update(geometry);
+  return geometry;
+}
+
+void InstanceGeometry::update(RTCGeometry geometry) {
+  rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(instances.size()));
+  rtcCommitGeometry(geometry);
+}
+
+}  // namespace farfield

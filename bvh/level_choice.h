@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which level a ray sees of an instance: a pure function of plan, instance and ray (DESIGN, decisions 4 and 7).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "bvh/traced_asset.h"
+#include "farfield/ray.h"
+
+namespace farfield {
+
+/// What the choice needs to know of an instance.
+struct InstanceFootprint {
+  float camera_footprint = 0;  ///< world units: the finest that the tessellation cameras have on it
+  float world_to_r0 = 0;       ///< lod_scale / instance scale: turns world footprints into local ones
+};
+
+/// The stored levels that lambda lies between: `slot`, and slot + 1 for the share `blend` of paths. lambda is clamped
+/// to what the plan allows and to the root.
+struct SlotBlend {
+  uint32_t slot;
+  float blend;  ///< in [0, 1); 0 at the root
+};
+SlotBlend split_slots(const TracedAsset& asset, float lambda);
+
+struct LevelChoice {
+  uint32_t slot;    ///< stored level
+  float lambda;     ///< that was asked for, after the plan's clamp
+  float footprint;  ///< world units, at the instance's bounds
+};
+
+/// lambda is that of the wider of the camera's footprint on the instance and the ray's cone where it enters the
+/// instance's bounds (t_entry), no finer than the plan allows. Between two stored levels a < b the path sees b with
+/// probability (lambda - a) / (b - a), decided by path_seed and instance alone, so every ray of the path sees the
+/// same one. A ray that leaves a hit on this instance keeps that hit's level. forced_lambda replaces lambda.
+LevelChoice choose_level(const TracedAsset& asset, const InstanceFootprint& footprint, uint32_t instance,
+                         const RayContext& ray, float t_entry, const std::optional<float>& forced_lambda);
+
+}  // namespace farfield

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// The BVH of a level's surface: a static Embree scene of quads over the level's own arrays.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include <cstdint>
+
+#include "base/result.h"
+#include "bvh/bvh_device.h"
+#include "cache/level.h"
+
+namespace farfield {
+
+/// What Embree does not report: scene objects, geometry objects and malloc's rounding, measured on 3.13.5.
+inline constexpr uint64_t kSceneOverheadBytes = 3072;
+inline constexpr uint64_t kGeometryOverheadBytes = 300;
+
+/// A committed Embree scene of one quad geometry with geomID 0 and primID = index of the quad; nothing for a level
+/// without a surface. Movable; any thread may trace it.
+class LevelScene {
+ public:
+  LevelScene() = default;
+  /// Builds on the calling thread alone, so that the same level always takes the same bytes. The level's arrays are
+  /// shared, not copied: they stay mapped until this is destroyed, but only this call reads them. Four bytes after the
+  /// last position must be readable (level files see to that), because Embree loads vertices 16 bytes at a time.
+  /// Holds device.build_mutex(). Errors: Io (out of memory, or what else Embree says).
+  static Result<LevelScene> build(BvhDevice& device, const LevelView& level);
+  ~LevelScene();
+  LevelScene(LevelScene&& other) noexcept;
+  LevelScene& operator=(LevelScene&& other) noexcept;
+
+  RTCScene handle() const { return scene_; }  ///< null without a surface
+  /// Bytes that the BVH holds, overheads included.
+  uint64_t bytes() const { return bytes_; }
+  /// Bytes that the build needed at its peak beyond bytes().
+  uint64_t build_peak_bytes() const { return build_peak_bytes_; }
+
+ private:
+  RTCScene scene_ = nullptr;
+  uint64_t bytes_ = 0;
+  uint64_t build_peak_bytes_ = 0;
+};
+
+/// What a level costs a host, as the manifest records it.
+struct LevelCost {
+  uint64_t resident_bytes = 0;    ///< file pages that rays touch, what the kernel maps around them unasked, BVH
+  uint64_t build_peak_bytes = 0;  ///< further bytes while it is loaded: pages that only the load reads, Embree's own
+};
+
+/// The cost of a level in a mapped file whose build pages were released (LevelFile::release_build_pages), with `scene`.
+LevelCost level_cost(const LevelView& level, const LevelScene& scene);
+
+/// Measures a level as the runtime would load it, by building its BVH once. Errors: those of LevelScene::build.
+Result<LevelCost> measure_level_scene(BvhDevice& device, const LevelView& level);
+/// The same on a device of its own.
+Result<LevelCost> measure_level_scene(const LevelView& level);
+
+}  // namespace farfield

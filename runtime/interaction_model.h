@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// What an Interaction holds beside its public fields: the scattering model in world space.
+#pragma once
+
+#include "bvh/instance_geometry.h"
+#include "bvh/traced_asset.h"
+#include "farfield/interaction.h"
+#include "scattering/flake_phase.h"
+#include "scattering/surface_bsdf.h"
+
+namespace farfield {
+
+/// Rebuilds the interaction of a hit on `level` of `instance`. ray_hit: as rtcIntersect1 left it. Pure.
+Interaction make_interaction(const TracedLevel& level, const InstanceRecord& instance, const RTCRayHit& ray_hit,
+                             const HitRecord& hit);
+
+namespace detail {
+
+/// Lies in Interaction::model_. Trivially copyable, as interactions are copied byte by byte.
+struct InteractionModel {
+  union {
+    SurfaceBsdf surface;  ///< Kind::Surface
+    FlakePhase flakes;    ///< Kind::Volume
+  };
+  float offset = 0;  ///< how far off the surface rays start, world units
+
+  InteractionModel(const SurfaceBsdf& bsdf, float ray_offset) : surface(bsdf), offset(ray_offset) {}
+  explicit InteractionModel(const FlakePhase& phase) : flakes(phase) {}
+
+  static const InteractionModel& of(const Interaction& interaction);
+  static void put(Interaction& interaction, const InteractionModel& model);
+};
+
+}  // namespace detail
+}  // namespace farfield

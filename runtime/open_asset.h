@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// An open asset: its manifest reduced to what the runtime needs, and how its levels are loaded.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bvh/traced_asset.h"
+#include "cache/level_file.h"
+#include "cache/residency.h"
+#include "farfield/runtime.h"
+
+namespace farfield {
+
+/// A level in memory: its mapped file and what rays need of it.
+struct LoadedLevel : Resident {
+  std::unique_ptr<LevelFile> file;  ///< first, so that it outlives the BVH over its arrays
+  std::unique_ptr<TracedLevel> traced;
+};
+
+/// An asset whose manifest was read and whose files are there. Its address does not change: rays hold it.
+struct OpenAsset {
+  std::string name;              ///< of its folder, for messages
+  std::filesystem::path folder;  ///< canonical
+  dvec3 origin{0.0};             ///< of local space in the source's space
+  Box3 bounds_source;            ///< in the source's space
+  TracedAsset traced;
+  std::vector<LevelInfo> levels;
+  std::vector<uint64_t> build_peak_bytes;  ///< per level, from the manifest
+  std::vector<std::string> file_names;     ///< per level, inside the folder
+  std::vector<size_t> items;               ///< per level: its number in the ResidentSet
+
+  /// Heap bytes of the tables above.
+  uint64_t table_bytes() const;
+};
+
+/// Reads and checks the manifest and sees that every level's file is there with the size it should have. Loads nothing.
+/// Errors: those of read_manifest; NotFound, BadFile (a level file), Unsupported (more than 256 levels).
+Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folder);
+
+/// What loads level `slot` of `asset`: maps the file, checks all of it, builds the BVH and gives back what only that
+/// needed. Refers to the arguments.
+ResidencyItem make_level_item(const OpenAsset& asset, uint32_t slot, BvhDevice& device);
+
+}  // namespace farfield

@@ -1,0 +1,567 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bvh/instance_geometry.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <map>
+#include <memory>
+#include <set>
+
+#include "base/hash.h"
+#include "base/parallel.h"
+#include "unit/bvh/test_levels.h"
+
+namespace farfield {
+namespace {
+
+using testing::random_unit;
+using testing::set_volume;
+using testing::sphere_level;
+using testing::triangle_soup;
+
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+RTCRayHit make_ray(const vec3& origin, const vec3& direction, float t_near = 0.0f, float t_far = kInf) {
+  RTCRayHit r{};
+  r.ray.org_x = origin.x, r.ray.org_y = origin.y, r.ray.org_z = origin.z;
+  r.ray.dir_x = direction.x, r.ray.dir_y = direction.y, r.ray.dir_z = direction.z;
+  r.ray.tnear = t_near, r.ray.tfar = t_far;
+  r.ray.mask = 0xffffffffu;
+  r.hit.geomID = r.hit.primID = r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  return r;
+}
+
+/// Any affine transform: rotation, shear, non-uniform scale, mirrored every other time.
+mat4x3 random_transform(Rng& rng, float far = 3.0f) {
+  mat4x3 m;
+  do {
+    for (int column = 0; column < 3; ++column) m[column] = (0.2f + 2.0f * rng.next()) * random_unit(rng);
+  } while (std::abs(glm::determinant(mat3(m))) < 0.05f);
+  m[3] = far * random_unit(rng);
+  return m;
+}
+
+vec3 apply(const mat4x3& m, const vec3& p) { return m * vec4(p, 1.0f); }
+
+/// Assets with all levels in memory, and a host scene over their instances.
+class Stage : public LevelSource {
+ public:
+  Stage() : device_(*BvhDevice::create()), host_device_(rtcNewDevice("")), geometry_(*this) {}
+  ~Stage() override {
+    if (scene_) rtcReleaseScene(scene_);
+    if (handle_) rtcReleaseGeometry(handle_);
+    rtcReleaseDevice(host_device_);
+  }
+
+  uint32_t add_asset(const std::vector<const LevelData*>& levels) {
+    auto asset = std::make_unique<TracedAsset>();
+    asset->base_resolution = levels[0]->header.resolution;
+    asset->loaded = std::make_unique<std::atomic<const TracedLevel*>[]>(levels.size());
+    for (const LevelData* level : levels) {
+      asset->bounds.extend(level->header.bounds);
+      asset->level_numbers.push_back(static_cast<float>(level->header.level));
+    }
+    asset->bounds = padded_bounds(asset->bounds);
+    levels_.emplace_back(levels);
+    geometry_.assets.push_back(asset.get());
+    assets_.push_back(std::move(asset));
+    return static_cast<uint32_t>(assets_.size() - 1);
+  }
+  uint32_t add_instance(uint32_t asset, const mat4x3& transform) {
+    const auto record = make_instance(asset, transform);
+    EXPECT_TRUE(record) << record.error().message;
+    geometry_.instances.push_back(*record);
+    return static_cast<uint32_t>(geometry_.instances.size() - 1);
+  }
+  /// The host's scene; `plain` adds a triangle mesh of the host's own.
+  RTCScene scene(RTCGeometry plain = nullptr) {
+    scene_ = rtcNewScene(host_device_);
+    handle_ = geometry_.create(host_device_);
+    geom_id = rtcAttachGeometry(scene_, handle_);
+    if (plain) rtcAttachGeometry(scene_, plain);
+    rtcCommitScene(scene_);
+    return scene_;
+  }
+  RTCDevice host_device() { return host_device_; }
+  InstanceGeometry& geometry() { return geometry_; }
+  TracedAsset& asset(uint32_t i) { return *assets_[i]; }
+
+  const TracedLevel* serve(uint32_t asset, uint32_t slot) override {
+    const std::lock_guard lock(mutex_);
+    auto& loaded = assets_[asset]->loaded[slot];
+    if (const TracedLevel* level = loaded.load()) return level;
+    auto level = TracedLevel::build(*device_, view_of(*levels_[asset][slot]), slot);
+    EXPECT_TRUE(level);
+    ++served;
+    loaded.store((*level).get(), std::memory_order_release);
+    built_.push_back(std::move(*level));
+    return built_.back().get();
+  }
+
+  unsigned geom_id = 0;
+  int served = 0;
+
+ private:
+  std::unique_ptr<BvhDevice> device_;
+  RTCDevice host_device_;
+  InstanceGeometry geometry_;
+  RTCScene scene_ = nullptr;
+  RTCGeometry handle_ = nullptr;
+  std::vector<std::unique_ptr<TracedAsset>> assets_;
+  std::vector<std::vector<const LevelData*>> levels_;
+  std::vector<std::unique_ptr<TracedLevel>> built_;
+  std::mutex mutex_;
+};
+
+/// The same triangles in world space, as a host without Farfield would have them.
+RTCGeometry flatten(RTCDevice device, const LevelData& level, const std::vector<mat4x3>& transforms) {
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  std::vector<uint32_t> triangles;
+  std::vector<vec3> positions;
+  for (const mat4x3& m : transforms) {
+    const auto base = static_cast<uint32_t>(positions.size());
+    for (const vec3& p : level.positions) positions.push_back(apply(m, p));
+    for (const Quad& q : level.quads) {
+      triangles.insert(triangles.end(), {base + q.v0, base + q.v1, base + q.v3});
+      if (q.is_pair()) triangles.insert(triangles.end(), {base + q.v2, base + q.v3, base + q.v1});
+    }
+  }
+  void* v = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, positions.size());
+  std::copy(positions.begin(), positions.end(), static_cast<vec3*>(v));
+  void* i = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, triangles.size() / 3);
+  std::copy(triangles.begin(), triangles.end(), static_cast<uint32_t*>(i));
+  rtcCommitGeometry(geometry);
+  return geometry;
+}
+
+struct Counts {
+  int rays = 0, hits = 0, different = 0, wrong_normal = 0;
+};
+
+/// Traces the same rays through instances and through the flattened mesh.
+Counts compare_with_flattened(const LevelData& level, int instance_count, uint64_t seed) {
+  Stage stage;
+  const uint32_t asset = stage.add_asset({&level});
+  Rng rng(seed);
+  std::vector<mat4x3> transforms;
+  for (int i = 0; i < instance_count; ++i) {
+    transforms.push_back(random_transform(rng));
+    stage.add_instance(asset, transforms.back());
+  }
+  const RTCScene scene = stage.scene();
+  const RTCScene plain = rtcNewScene(stage.host_device());
+  RTCGeometry mesh = flatten(stage.host_device(), level, transforms);
+  rtcAttachGeometry(plain, mesh);
+  rtcReleaseGeometry(mesh);
+  rtcCommitScene(plain);
+
+  Counts counts;
+  for (int i = 0; i < 20000; ++i) {
+    const vec3 direction = (0.5f + rng.next()) * random_unit(rng);
+    const vec3 origin = 3.0f * random_unit(rng) - 3.0f * direction;
+    RTCRayHit a = make_ray(origin, direction);
+    RTCRayHit b = a;
+    RayContext context;
+    RTCIntersectContext plain_context;
+    rtcInitIntersectContext(&plain_context);
+    rtcIntersect1(scene, &context.embree, &a);
+    rtcIntersect1(plain, &plain_context, &b);
+    RTCRay shadow = make_ray(origin, direction).ray;
+    rtcOccluded1(scene, &context.embree, &shadow);
+    ++counts.rays;
+    const bool hit = a.hit.geomID == stage.geom_id;
+    EXPECT_EQ(hit, shadow.tfar < 0.0f);
+    EXPECT_EQ(a.ray.org_x, origin.x);
+    EXPECT_EQ(a.ray.dir_z, direction.z);
+    counts.hits += b.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+    const bool same = hit == (b.hit.geomID != RTC_INVALID_GEOMETRY_ID) &&
+                      (!hit || std::abs(a.ray.tfar - b.ray.tfar) < 1e-4f * (1.0f + b.ray.tfar));
+    if (!same) {
+      ++counts.different;
+      continue;
+    }
+    if (!hit) continue;
+    EXPECT_EQ(a.hit.primID, context.hit.instance);
+    EXPECT_LT(a.hit.primID, transforms.size());
+    const vec3 na = glm::normalize(vec3(a.hit.Ng_x, a.hit.Ng_y, a.hit.Ng_z));
+    const vec3 nb = glm::normalize(vec3(b.hit.Ng_x, b.hit.Ng_y, b.hit.Ng_z));
+    counts.wrong_normal += glm::dot(na, nb) < 0.999f;  // same side too, mirrored instances included
+  }
+  rtcReleaseScene(plain);
+  return counts;
+}
+
+TEST(InstanceGeometry, HitsWhatTheFlattenedTrianglesHit) {
+  const Counts counts = compare_with_flattened(triangle_soup(300, 0.2f, 1), 20, 42);
+  EXPECT_GT(counts.hits, 5000);
+  EXPECT_LE(counts.different, counts.rays / 1000);    // rays through edges, where rounding decides
+  EXPECT_LE(counts.wrong_normal, counts.rays / 500);  // two faces at nearly the same distance; sliver normals
+}
+
+TEST(InstanceGeometry, HitsWhatTheFlattenedQuadsHit) {
+  const Counts counts = compare_with_flattened(sphere_level(vec3(0.5f), 0.5f, 16), 20, 43);
+  EXPECT_GT(counts.hits, 5000);
+  EXPECT_LE(counts.different, counts.rays / 1000);
+  EXPECT_LE(counts.wrong_normal, counts.rays / 500);
+}
+
+TEST(InstanceGeometry, TellsWhichFaceWasHit) {
+  LevelData level = testing::empty_level(0, 1.0f);
+  testing::set_quads(level, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2, 3}});
+  Stage stage;
+  stage.add_instance(stage.add_asset({&level}), mat4x3(1.0f));
+  const RTCScene scene = stage.scene();
+  RayContext context;
+  RTCRayHit first = make_ray({0.2f, 0.2f, 1}, {0, 0, -1});
+  rtcIntersect1(scene, &context.embree, &first);
+  EXPECT_EQ(context.hit.element, 0u);  // (v0, v1, v3)
+  RTCRayHit second = make_ray({0.8f, 0.8f, 1}, {0, 0, -1});
+  rtcIntersect1(scene, &context.embree, &second);
+  EXPECT_EQ(context.hit.element, 1u);  // (v2, v3, v1)
+  EXPECT_FALSE(context.hit.is_volume);
+}
+
+TEST(InstanceGeometry, NearerHostGeometryKeepsItsIds) {
+  const LevelData soup = triangle_soup(500, 0.3f, 2);
+  Stage stage;
+  stage.add_instance(stage.add_asset({&soup}), mat4x3(1.0f));
+  // The host's own copy of the same triangles: every distance ties, and either may win, but ids must be consistent.
+  RTCGeometry host_mesh = flatten(stage.host_device(), soup, {mat4x3(1.0f)});
+  const RTCScene scene = stage.scene(host_mesh);
+  rtcReleaseGeometry(host_mesh);
+  Rng rng(3);
+  int host = 0, ours = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const vec3 direction = random_unit(rng);
+    RTCRayHit ray = make_ray(vec3(0.5f) - 2.0f * direction + 0.3f * random_unit(rng), direction);
+    RayContext context;
+    rtcIntersect1(scene, &context.embree, &ray);
+    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
+    if (ray.hit.geomID == stage.geom_id) {
+      ++ours;
+      ASSERT_EQ(ray.hit.primID, 0u);
+      ASSERT_EQ(context.hit.instance, 0u);
+    } else {
+      ++host;
+      ASSERT_EQ(ray.hit.geomID, 1u);
+      ASSERT_LT(ray.hit.primID, soup.quads.size());
+    }
+  }
+  EXPECT_GT(host + ours, 1000);
+}
+
+TEST(InstanceGeometry, PacketsAndStreamsSeeTheSameDistancesAsSingleRays) {
+  LevelData level = triangle_soup(200, 0.3f, 4);
+  level.header.resolution = 0.125f;
+  set_volume(level, {1, 1, 1}, vec3(0.0f), [](int, int, int) { return 1.5f; });
+  Stage stage;
+  const uint32_t asset = stage.add_asset({&level});
+  Rng rng(5);
+  for (int i = 0; i < 10; ++i) stage.add_instance(asset, random_transform(rng));
+  const RTCScene scene = stage.scene();
+
+  constexpr unsigned kRays = 512;
+  std::vector<RTCRayHit> single, rays;
+  for (unsigned i = 0; i < kRays; ++i) {
+    const vec3 direction = random_unit(rng);
+    rays.push_back(make_ray(2.0f * random_unit(rng) - 4.0f * direction, direction));
+    rays.back().ray.id = i;
+  }
+  RayContext context;
+  context.ray_seed = 77;
+  single = rays;
+  int hits = 0;
+  for (RTCRayHit& ray : single) {
+    rtcIntersect1(scene, &context.embree, &ray);
+    hits += ray.hit.geomID == stage.geom_id;
+  }
+  EXPECT_GT(hits, 100);
+
+  const auto expect_same = [&](const RTCRayHit& ray, unsigned i, const char* what) {
+    EXPECT_EQ(ray.hit.geomID, single[i].hit.geomID) << what << " " << i;
+    EXPECT_EQ(ray.ray.tfar, single[i].ray.tfar) << what << " " << i;
+    if (ray.hit.geomID != RTC_INVALID_GEOMETRY_ID) {
+      EXPECT_EQ(ray.hit.primID, single[i].hit.primID) << what << " " << i;
+    }
+  };
+  const auto packets = [&]<typename RayHitN>(RayHitN, unsigned n, auto trace, const char* what) {
+    for (unsigned base = 0; base < kRays; base += n) {
+      RayHitN packet;
+      alignas(64) int valid[16];
+      for (unsigned lane = 0; lane < n; ++lane) {
+        valid[lane] = lane % 3 == 1 ? 0 : -1;
+        rtcCopyHitToHitN(reinterpret_cast<RTCHitN*>(&packet.hit), &rays[base + lane].hit, n, lane);
+        const RTCRay& r = rays[base + lane].ray;
+        auto* p = reinterpret_cast<RTCRayN*>(&packet.ray);
+        RTCRayN_org_x(p, n, lane) = r.org_x, RTCRayN_org_y(p, n, lane) = r.org_y, RTCRayN_org_z(p, n, lane) = r.org_z;
+        RTCRayN_dir_x(p, n, lane) = r.dir_x, RTCRayN_dir_y(p, n, lane) = r.dir_y, RTCRayN_dir_z(p, n, lane) = r.dir_z;
+        RTCRayN_tnear(p, n, lane) = r.tnear, RTCRayN_tfar(p, n, lane) = r.tfar, RTCRayN_time(p, n, lane) = 0.0f;
+        RTCRayN_mask(p, n, lane) = r.mask, RTCRayN_id(p, n, lane) = r.id, RTCRayN_flags(p, n, lane) = 0;
+      }
+      trace(valid, &packet);
+      for (unsigned lane = 0; lane < n; ++lane) {
+        RTCRayHit got = rays[base + lane];
+        if (valid[lane]) {
+          got.ray.tfar = RTCRayN_tfar(reinterpret_cast<RTCRayN*>(&packet.ray), n, lane);
+          got.hit = rtcGetHitFromHitN(reinterpret_cast<RTCHitN*>(&packet.hit), n, lane);
+          expect_same(got, base + lane, what);
+        } else {
+          EXPECT_EQ(RTCRayN_tfar(reinterpret_cast<RTCRayN*>(&packet.ray), n, lane), kInf) << what;
+        }
+      }
+    }
+  };
+  packets(
+      RTCRayHit4{}, 4, [&](int* v, RTCRayHit4* p) { rtcIntersect4(v, scene, &context.embree, p); }, "4");
+  packets(
+      RTCRayHit8{}, 8, [&](int* v, RTCRayHit8* p) { rtcIntersect8(v, scene, &context.embree, p); }, "8");
+  packets(
+      RTCRayHit16{}, 16, [&](int* v, RTCRayHit16* p) { rtcIntersect16(v, scene, &context.embree, p); }, "16");
+
+  for (const RTCIntersectContextFlags flags :
+       {RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT, RTC_INTERSECT_CONTEXT_FLAG_COHERENT}) {
+    context.embree.flags = flags;
+    std::vector<RTCRayHit> stream = rays;
+    rtcIntersect1M(scene, &context.embree, stream.data(), kRays, sizeof(RTCRayHit));
+    for (unsigned i = 0; i < kRays; ++i) expect_same(stream[i], i, "1M");
+    std::vector<RTCRay> shadows;
+    for (const RTCRayHit& ray : rays) shadows.push_back(ray.ray);
+    rtcOccluded1M(scene, &context.embree, shadows.data(), kRays, sizeof(RTCRay));
+    for (unsigned i = 0; i < kRays; ++i) {
+      EXPECT_EQ(shadows[i].tfar < 0.0f, single[i].hit.geomID != RTC_INVALID_GEOMETRY_ID) << i;
+    }
+  }
+}
+
+TEST(InstanceGeometry, VolumesKeepTheirTransmittanceUnderAnyAffineTransform) {
+  LevelData level = testing::empty_level(0, 0.125f);
+  const SymMat3 s = SymMat3::outer(glm::normalize(vec3(1, 2, 3))) + SymMat3::identity() * 0.05f;
+  set_volume(
+      level, {1, 1, 1}, vec3(0.0f), [](int, int, int) { return 2.5f; }, [&](int, int, int) { return s; });
+  Rng rng(6);
+  for (int i = 0; i < 12; ++i) {
+    Stage stage;
+    const mat4x3 transform = random_transform(rng);
+    stage.add_instance(stage.add_asset({&level}), transform);
+    const RTCScene scene = stage.scene();
+    const vec3 from_local = vec3(0.5f) + 2.0f * random_unit(rng);
+    const vec3 to_local = vec3(0.5f) + 0.3f * random_unit(rng);
+    const vec3 origin = apply(transform, from_local);
+    const vec3 direction = glm::normalize(apply(transform, to_local) - origin);  // unit in the world, as hosts trace
+    const double depth = testing::optical_depth(level, from_local, 4.0f * (to_local - from_local), 1.0);
+
+    constexpr int kRays = 20000;
+    int passed = 0;
+    for (uint32_t seed = 0; seed < kRays; ++seed) {
+      RayContext context;
+      context.ray_seed = seed;
+      RTCRayHit ray = make_ray(origin, direction);
+      rtcIntersect1(scene, &context.embree, &ray);
+      const bool hit = ray.hit.geomID == stage.geom_id;
+      passed += !hit;
+      RTCRay shadow = make_ray(origin, direction).ray;
+      rtcOccluded1(scene, &context.embree, &shadow);
+      ASSERT_EQ(hit, shadow.tfar < 0.0f);  // the same seed gives the same answer
+      if (hit) {
+        ASSERT_TRUE(context.hit.is_volume);
+        ASSERT_LT(context.hit.element, voxel_count(level));
+      }
+    }
+    const double expected = std::exp(-depth);
+    EXPECT_NEAR(passed / double(kRays), expected, 4.5 * std::sqrt(expected * (1 - expected) / kRays)) << i;
+  }
+}
+
+TEST(InstanceGeometry, TheNearestOfSurfaceAndVolumeWins) {
+  LevelData level = sphere_level(vec3(0.5f), 0.25f, 12);
+  level.header.resolution = 0.125f;
+  set_volume(level, {1, 1, 1}, vec3(0.0f), [](int, int, int) { return 2.0f; });
+  Stage stage;
+  stage.add_instance(stage.add_asset({&level}), mat4x3(1.0f));
+  const RTCScene scene = stage.scene();
+  int surface = 0;
+  constexpr int kRays = 20000;
+  for (uint32_t seed = 0; seed < kRays; ++seed) {
+    RayContext context;
+    context.ray_seed = seed;
+    RTCRayHit ray = make_ray({-1.0f, 0.51f, 0.52f}, {1, 0, 0});
+    rtcIntersect1(scene, &context.embree, &ray);
+    ASSERT_EQ(ray.hit.geomID, stage.geom_id);  // the sphere stops what the volume lets through
+    surface += !context.hit.is_volume;
+    if (context.hit.is_volume) {
+      ASSERT_LT(ray.ray.tfar, 1.26f);
+      ASSERT_EQ(ray.hit.Ng_x, 0.0f);
+    } else {
+      ASSERT_NEAR(ray.ray.tfar, 1.253f, 0.005f);
+    }
+  }
+  const double expected = std::exp(-2.0 * 0.253);
+  EXPECT_NEAR(surface / double(kRays), expected, 0.02);
+}
+
+TEST(InstanceGeometry, InstancesOfOneAssetHaveIndependentFreeFlights) {
+  LevelData level = testing::empty_level(0, 0.125f);
+  set_volume(level, {1, 1, 1}, vec3(0.0f), [](int, int, int) { return 0.7f; });
+  Stage stage;
+  const uint32_t asset = stage.add_asset({&level});
+  for (int i = 0; i < 3; ++i) {
+    mat4x3 m(1.0f);
+    m[3] = vec3(2.0f * static_cast<float>(i), 0, 0);
+    stage.add_instance(asset, m);
+  }
+  const RTCScene scene = stage.scene();
+  int passed = 0;
+  constexpr int kRays = 40000;
+  for (uint32_t seed = 0; seed < kRays; ++seed) {
+    RayContext context;
+    context.ray_seed = seed;
+    RTCRayHit ray = make_ray({-1.0f, 0.51f, 0.52f}, {1, 0, 0});
+    rtcIntersect1(scene, &context.embree, &ray);
+    passed += ray.hit.geomID == RTC_INVALID_GEOMETRY_ID;
+  }
+  const double expected = std::exp(-2.1);
+  EXPECT_NEAR(passed / double(kRays), expected, 4.5 * std::sqrt(expected * (1 - expected) / kRays));
+}
+
+TEST(InstanceGeometry, AllInstancesShareLoadedLevelsAndThreadsAgree) {
+  const LevelData fine = triangle_soup(2000, 0.1f, 7);
+  LevelData coarse = triangle_soup(100, 0.4f, 8);
+  coarse.header.level = 1;
+  std::vector<std::vector<float>> results;
+  for (const int threads : {1, 0}) {
+    Stage stage;
+    const uint32_t asset = stage.add_asset({&fine, &coarse});
+    Rng rng(9);
+    for (int i = 0; i < 50; ++i) stage.add_instance(asset, random_transform(rng));
+    stage.geometry().forced_lambda = 0.5f;
+    const RTCScene scene = stage.scene();
+    std::vector<float> t(20000);
+    const ThreadLimit limit(threads);
+    parallel_for(t.size(), 64, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end; ++i) {
+        Rng ray_rng(i);
+        const vec3 direction = random_unit(ray_rng);
+        RTCRayHit ray = make_ray(4.0f * random_unit(ray_rng) - 4.0f * direction, direction);
+        RayContext context;
+        context.path_seed = static_cast<uint32_t>(i);
+        rtcIntersect1(scene, &context.embree, &ray);
+        t[i] = ray.ray.tfar;
+      }
+    });
+    EXPECT_EQ(stage.served, 2);
+    results.push_back(t);
+  }
+  EXPECT_EQ(results[0], results[1]);
+}
+
+TEST(InstanceGeometry, BoundsContainEveryHitUnderExtremeTransforms) {
+  const LevelData soup = triangle_soup(50, 0.3f, 10);
+  TracedAsset asset;
+  asset.bounds = soup.header.bounds;
+  TracedAsset with_hull;
+  with_hull.bounds = asset.bounds;
+  with_hull.hull = soup.positions;
+  Rng rng(11);
+  for (int i = 0; i < 300; ++i) {
+    mat4x3 m = random_transform(rng, std::pow(10.0f, 7.0f * rng.next()));
+    if (i % 3 == 0) {
+      const float scale = std::pow(10.0f, 12.0f * rng.next() - 6.0f);
+      for (int column = 0; column < 3; ++column) m[column] *= scale;
+    }
+    const auto record = make_instance(0, m);
+    ASSERT_TRUE(record);
+    for (const TracedAsset* a : {&asset, &with_hull}) {
+      const Box3 bounds = instance_bounds(*record, *a);
+      ASSERT_TRUE(is_finite(bounds.lower) && is_finite(bounds.upper));
+      for (const vec3& p : soup.positions) {
+        const vec3 q = apply(m, p);
+        for (int axis = 0; axis < 3; ++axis) {
+          ASSERT_LE(bounds.lower[axis], q[axis]);
+          ASSERT_GE(bounds.upper[axis], q[axis]);
+        }
+      }
+    }
+    // The hull gives bounds at least as tight.
+    const vec3 difference = instance_bounds(*record, asset).size() - instance_bounds(*record, with_hull).size();
+    EXPECT_GE(min_component(difference), -1e-3f * max_component(instance_bounds(*record, asset).size()));
+  }
+}
+
+TEST(InstanceGeometry, RefusesTransformsThatCannotBeInverted) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  mat4x3 flat(1.0f);
+  flat[1] = vec3(0.0f);
+  mat4x3 dependent(1.0f);
+  dependent[1] = 2.0f * dependent[0];
+  mat4x3 with_nan(1.0f);
+  with_nan[3].y = nan;
+  mat4x3 with_infinity(1.0f);
+  with_infinity[0].x = kInf;
+  mat4x3 tiny(1.0f);
+  for (int column = 0; column < 3; ++column) tiny[column] *= 1e-39f;
+  for (const mat4x3& m : {flat, dependent, with_nan, with_infinity, tiny, mat4x3(0.0f)}) {
+    const auto record = make_instance(0, m);
+    ASSERT_FALSE(record);
+    EXPECT_EQ(record.error().code, ErrorCode::InvalidArgument);
+  }
+}
+
+TEST(InstanceGeometry, LargestStretchIsTheLongestImageOfAUnitVector) {
+  Rng rng(12);
+  for (int i = 0; i < 50; ++i) {
+    const mat4x3 m = random_transform(rng);
+    float longest = 0.0f;
+    for (int k = 0; k < 20000; ++k) longest = std::max(longest, glm::length(mat3(m) * random_unit(rng)));
+    EXPECT_LE(longest, largest_stretch(m) * 1.00001f);
+    EXPECT_GE(longest, largest_stretch(m) * 0.995f);
+  }
+  EXPECT_FLOAT_EQ(largest_stretch(mat4x3(1.0f)), 1.0f);
+  EXPECT_FLOAT_EQ(largest_stretch(mat4x3(3e20f)), 3e20f);
+}
+
+TEST(InstanceGeometry, RaysWithoutADirectionOrThatLeaveEmbreesRangeMeetNothing) {
+  LevelData level = sphere_level(vec3(0.5f), 0.25f, 12);
+  level.header.resolution = 0.125f;
+  set_volume(level, {1, 1, 1}, vec3(0.0f), [](int, int, int) { return 2.0f; });
+  Stage stage;
+  const uint32_t asset = stage.add_asset({&level});
+  stage.add_instance(asset, mat4x3(1.0f));
+  mat4x3 speck(1e-15f);  // makes 1e18 of a length of 1000, and worse behind it
+  stage.add_instance(asset, speck);
+  const RTCScene scene = stage.scene();
+  Rng rng(14);
+  for (int i = 0; i < 2000; ++i) {
+    RayContext context;
+    context.ray_seed = static_cast<uint32_t>(i);
+    const vec3 direction = i == 0 ? vec3(0.0f) : std::pow(10.0f, 8.0f * rng.next()) * random_unit(rng);
+    RTCRayHit ray = make_ray((i % 2 ? -1.0f : -1e4f) * direction, direction);
+    rtcIntersect1(scene, &context.embree, &ray);  // towards the origin, where the speck is
+    EXPECT_FALSE(std::isnan(ray.ray.tfar));
+    RTCRay shadow = make_ray(-direction, direction).ray;
+    rtcOccluded1(scene, &context.embree, &shadow);
+    EXPECT_FALSE(std::isnan(shadow.tfar));
+  }
+}
+
+TEST(InstanceGeometry, FarAwayInstancesAreHitWithinTheRoundingOfTheirPlace) {
+  const LevelData sphere = sphere_level(vec3(0.0f), 1.0f, 32);
+  Stage stage;
+  const uint32_t asset = stage.add_asset({&sphere});
+  mat4x3 m(1000.0f);
+  m[3] = vec3(1e7f, -1e7f, 1e7f);
+  stage.add_instance(asset, m);
+  const RTCScene scene = stage.scene();
+  Rng rng(13);
+  for (int i = 0; i < 2000; ++i) {
+    const vec3 direction = random_unit(rng);
+    RTCRayHit ray = make_ray(m[3] - 3000.0f * direction, direction);
+    RayContext context;
+    rtcIntersect1(scene, &context.embree, &ray);
+    ASSERT_EQ(ray.hit.geomID, stage.geom_id);
+    ASSERT_NEAR(ray.ray.tfar, 2000.0f, 25.0f);  // facets of 1000 (1 - cos(pi/64)) = 1.2, ulp of 1e7 = 1
+  }
+}
+
+}  // namespace
+}  // namespace farfield

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bvh/level_scene.h"
+
+#include <gtest/gtest.h>
+
+#include "base/parallel.h"
+#include "unit/bvh/test_levels.h"
+
+namespace farfield {
+namespace {
+
+using testing::triangle_soup;
+
+TEST(LevelScene, TakesTheSameBytesEveryTimeAndGivesThemAllBack) {
+  auto device = BvhDevice::create();
+  ASSERT_TRUE(device) << device.error().message;
+  const LevelData soup = triangle_soup(20000, 0.02f, 1);
+  const uint64_t before = (*device)->bytes();
+  uint64_t bytes = 0;
+  for (int i = 0; i < 3; ++i) {
+    const auto scene = LevelScene::build(**device, view_of(soup));
+    ASSERT_TRUE(scene);
+    if (i == 0) bytes = scene->bytes();
+    EXPECT_EQ(scene->bytes(), bytes);
+    EXPECT_EQ((*device)->bytes() - before, scene->bytes() - kSceneOverheadBytes - kGeometryOverheadBytes);
+    EXPECT_GT(scene->build_peak_bytes(), 0u);
+  }
+  EXPECT_EQ((*device)->bytes(), before);
+  EXPECT_GT(bytes, 20000u * 30);
+  EXPECT_LT(bytes, 20000u * 150);
+}
+
+TEST(LevelScene, CostIsTheSameWhateverElseIsLoaded) {
+  const LevelData soup = triangle_soup(5000, 0.02f, 2);
+  const LevelData other = triangle_soup(3000, 0.02f, 3);
+  const auto alone = measure_level_scene(view_of(soup));
+  ASSERT_TRUE(alone);
+  auto device = BvhDevice::create();
+  ASSERT_TRUE(device);
+  const auto resident = LevelScene::build(**device, view_of(other));
+  const auto beside = measure_level_scene(**device, view_of(soup));
+  ASSERT_TRUE(beside);
+  EXPECT_EQ(alone->resident_bytes, beside->resident_bytes);
+  EXPECT_EQ(alone->build_peak_bytes, beside->build_peak_bytes);
+}
+
+TEST(LevelScene, CostDoesNotDependOnTheNumberOfThreads) {
+  const LevelData soup = triangle_soup(30000, 0.02f, 4);
+  const auto many = measure_level_scene(view_of(soup));
+  const ThreadLimit limit(1);
+  const auto one = measure_level_scene(view_of(soup));
+  ASSERT_TRUE(many && one);
+  EXPECT_EQ(many->resident_bytes, one->resident_bytes);
+  EXPECT_EQ(many->build_peak_bytes, one->build_peak_bytes);
+}
+
+TEST(LevelScene, OurDeviceKeepsTheThreadLimitThatItFinds) {
+  const ThreadLimit limit(1);
+  ASSERT_EQ(thread_count(), 1);
+  const auto device = BvhDevice::create();
+  ASSERT_TRUE(device);
+  EXPECT_EQ(thread_count(), 1);
+}
+
+TEST(LevelScene, ALevelWithoutSurfaceHasNoScene) {
+  auto device = BvhDevice::create();
+  ASSERT_TRUE(device);
+  LevelData level = testing::empty_level(3, 1.0f);
+  const auto nothing = LevelScene::build(**device, view_of(level));
+  ASSERT_TRUE(nothing);
+  EXPECT_EQ(nothing->handle(), nullptr);
+  EXPECT_EQ(nothing->bytes(), 0u);
+  testing::set_volume(level, {1, 1, 1}, vec3(0.0f), [](int, int, int) { return 1.0f; });
+  const auto cost = measure_level_scene(**device, view_of(level));
+  ASSERT_TRUE(cost);
+  EXPECT_GE(cost->resident_bytes, sizeof(Brick) + sizeof(uint32_t));
+  EXPECT_EQ(cost->build_peak_bytes, 0u);
+}
+
+TEST(LevelScene, DegenerateQuadsAreNoError) {
+  auto device = BvhDevice::create();
+  ASSERT_TRUE(device);
+  LevelData level = testing::empty_level(0, 1.0f);
+  testing::set_triangles(level, {vec3(0.0f), vec3(1.0f), vec3(1.0f)}, {{0, 0, 0}, {1, 2, 1}, {0, 1, 2}});
+  const auto scene = LevelScene::build(**device, view_of(level));
+  ASSERT_TRUE(scene);
+  EXPECT_NE(scene->handle(), nullptr);
+}
+
+}  // namespace
+}  // namespace farfield
