@@ -86,6 +86,8 @@ TEST(LevelFile, SizesAreKnownBeforeWriting) {
 
 TEST(LevelFile, MorphMapsAreGivenBackToo) {
   LevelData level = test::random_level(6, 5000, 10);
+  level.morph_vertex.clear();
+  level.morph_face.clear();
   const LevelFileSizes without = level_file_sizes(view_of(level));
   level.morph_vertex.assign(10000, 0);
   level.morph_face.assign(10000, 0);
