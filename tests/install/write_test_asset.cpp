@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// write_test_asset FOLDER: a small asset for tests that run other programs.
+#include <cstdio>
+
+#include "unit/bvh/test_levels.h"
+#include "unit/runtime/test_asset.h"
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: write_test_asset FOLDER\n");
+    return 1;
+  }
+  std::vector<farfield::LevelData> levels = farfield::testing::white_sphere();
+  for (farfield::LevelData& level : levels) farfield::testing::set_diffuse(level, {0.7f, 0.5f, 0.2f});
+  farfield::testing::write_asset(argv[1], levels);
+}

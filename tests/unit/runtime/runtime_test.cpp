@@ -1,0 +1,586 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "farfield/runtime.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <limits>
+#include <thread>
+
+#include "base/parallel.h"
+#include "base/vec.h"
+#include "cache/manifest.h"
+#include "unit/bvh/test_levels.h"
+#include "unit/runtime/test_asset.h"
+
+namespace farfield {
+namespace {
+
+using testing::hash_of_hits;
+using testing::Host;
+using testing::TemporaryFolder;
+using testing::white_sphere;
+using testing::write_asset;
+
+/// The white sphere on disk, once for all tests.
+class RuntimeTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    write_asset(sphere(), white_sphere());
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    folder_ = nullptr;
+  }
+  static std::filesystem::path sphere() { return folder_->path() / "sphere.farfield"; }
+  /// A copy that a test may break.
+  static std::filesystem::path copy(const char* name) {
+    const auto target = folder_->path() / name;
+    std::filesystem::remove_all(target);
+    std::filesystem::copy(sphere(), target);
+    return target;
+  }
+
+ private:
+  static TemporaryFolder* folder_;
+};
+TemporaryFolder* RuntimeTest::folder_ = nullptr;
+
+void flip_byte(const std::filesystem::path& file, uint64_t offset) {
+  std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+  stream.seekg(static_cast<std::streamoff>(offset));
+  const char byte = static_cast<char>(stream.get() ^ 0x55);
+  stream.seekp(static_cast<std::streamoff>(offset));
+  stream.put(byte);
+}
+
+RuntimeOptions with_budget(uint64_t bytes) {
+  RuntimeOptions options;
+  options.budget_bytes = bytes;
+  return options;
+}
+
+RuntimeOptions with_lambda(float lambda) {
+  RuntimeOptions options;
+  options.forced_lambda = lambda;
+  return options;
+}
+
+// --- Opening ---------------------------------------------------------------------------------------------------------
+
+TEST_F(RuntimeTest, CreateRefusesImpossibleOptions) {
+  RTCDevice device = rtcNewDevice("");
+  const auto refuses = [&](const RuntimeOptions& options) {
+    const auto runtime = Runtime::create(device, options);
+    return !runtime && runtime.error().code == ErrorCode::InvalidArgument;
+  };
+  EXPECT_TRUE(refuses(with_budget(0)));
+  for (const float scale :
+       {0.0f, -1.0f, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    RuntimeOptions options;
+    options.lod_scale = scale;
+    EXPECT_TRUE(refuses(options));
+  }
+  EXPECT_TRUE(refuses(with_lambda(std::numeric_limits<float>::quiet_NaN())));
+  EXPECT_FALSE(Runtime::create(nullptr, {}));
+  EXPECT_TRUE(Runtime::create(device, {}));
+  rtcReleaseDevice(device);
+}
+
+TEST_F(RuntimeTest, OpensAnAssetAndDescribesIt) {
+  Host host;
+  const auto asset = host.runtime().open_asset(sphere().string());
+  ASSERT_TRUE(asset) << asset.error().message;
+  const std::vector<LevelInfo>& levels = host.runtime().levels(*asset);
+  ASSERT_EQ(levels.size(), 5u);
+  EXPECT_EQ(levels[4].level, 5u);
+  EXPECT_EQ(levels[0].triangles, 2u * 128 + 62u * 128 * 2);
+  EXPECT_GT(levels[3].voxels, 0u);
+  EXPECT_GT(levels[0].resident_bytes, levels[1].resident_bytes);
+  vec3 lower, upper;
+  host.runtime().bounds(*asset, lower, upper);
+  EXPECT_LE(lower.x, -1.0f);
+  EXPECT_GE(upper.z, 1.0f);
+  EXPECT_EQ(host.runtime().stats().levels_resident, 1u);  // the root
+}
+
+TEST_F(RuntimeTest, TheSameFolderIsTheSameAsset) {
+  Host host;
+  const auto a = host.runtime().open_asset(sphere().string());
+  const auto b = host.runtime().open_asset((sphere() / ".." / "sphere.farfield/").string());
+  const auto other = host.runtime().open_asset(copy("other.farfield").string());
+  ASSERT_TRUE(a && b && other);
+  EXPECT_EQ(a->value, b->value);
+  EXPECT_NE(a->value, other->value);
+  EXPECT_EQ(host.runtime().stats().levels_loaded, 2u);
+}
+
+TEST_F(RuntimeTest, OpeningSaysWhatIsWrong) {
+  Host host;
+  const auto error_of = [&](const std::filesystem::path& folder) {
+    const auto asset = host.runtime().open_asset(folder.string());
+    EXPECT_FALSE(asset);
+    return asset ? Error{ErrorCode::Io, ""} : asset.error();
+  };
+  EXPECT_EQ(error_of("/nowhere/at/all.farfield").code, ErrorCode::NotFound);
+
+  const auto no_manifest = copy("no_manifest.farfield");
+  std::filesystem::remove(no_manifest / "manifest.json");
+  EXPECT_EQ(error_of(no_manifest).code, ErrorCode::NotFound);
+
+  const auto no_level = copy("no_level.farfield");
+  std::filesystem::remove(no_level / "level_1.ffl");
+  const Error missing = error_of(no_level);
+  EXPECT_EQ(missing.code, ErrorCode::NotFound);
+  EXPECT_NE(missing.message.find("level_1.ffl"), std::string::npos) << missing.message;
+
+  const auto cut = copy("cut.farfield");
+  std::filesystem::resize_file(cut / "level_0.ffl", 1000);
+  EXPECT_EQ(error_of(cut).code, ErrorCode::BadFile);
+
+  const auto broken_root = copy("broken_root.farfield");
+  flip_byte(broken_root / "level_5.ffl", std::filesystem::file_size(broken_root / "level_5.ffl") / 2);
+  EXPECT_EQ(error_of(broken_root).code, ErrorCode::BadFile);
+
+  const auto swapped = copy("swapped.farfield");  // a good file of another level
+  std::filesystem::copy_file(swapped / "level_3.ffl", swapped / "level_5.ffl",
+                             std::filesystem::copy_options::overwrite_existing);
+  EXPECT_EQ(error_of(swapped).code, ErrorCode::BadFile);
+  EXPECT_TRUE(host.messages.empty());  // the caller has been told
+
+  EXPECT_TRUE(host.runtime().open_asset(sphere().string()));  // and the runtime still works
+}
+
+TEST_F(RuntimeTest, ABudgetBelowTheRootsIsRefusedWithTheNumberThatWouldDo) {
+  uint64_t enough = 0;
+  {
+    Host host(with_budget(1000));
+    const auto asset = host.runtime().open_asset(sphere().string());
+    ASSERT_FALSE(asset);
+    ASSERT_EQ(asset.error().code, ErrorCode::OutOfBudget);
+    // The message ends in "... N bytes ..."; the largest number in it is the one.
+    for (size_t i = 0; i < asset.error().message.size(); ++i) {
+      if (std::isdigit(asset.error().message[i])) {
+        size_t end = 0;
+        enough = std::max<uint64_t>(enough, std::stoull(asset.error().message.substr(i), &end));
+        i += end;
+      }
+    }
+  }
+  ASSERT_GT(enough, 1000u);
+  Host host(with_budget(enough));
+  const auto asset = host.runtime().open_asset(sphere().string());
+  ASSERT_TRUE(asset) << asset.error().message;
+  EXPECT_LE(host.runtime().stats().peak_accounted_bytes, enough);
+  EXPECT_FALSE(Host(with_budget(enough - 1)).runtime().open_asset(sphere().string()));
+}
+
+// --- Instances and scenes --------------------------------------------------------------------------------------------
+
+TEST_F(RuntimeTest, InstancesNeedAnAssetAndATransformThatCanBeInverted) {
+  Host host;
+  const AssetId asset = host.add(sphere(), {});
+  EXPECT_FALSE(host.runtime().add_instance(AssetId{7}, mat4x3(1.0f)));
+  EXPECT_FALSE(host.runtime().add_instance(asset, mat4x3(0.0f)));
+  const auto first = host.runtime().add_instance(asset, mat4x3(1.0f));
+  const auto second = host.runtime().add_instance(asset, mat4x3(2.0f));
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(first->value, 0u);
+  EXPECT_EQ(second->value, 1u);
+}
+
+TEST_F(RuntimeTest, AttachingAgainTakesNewInstancesAndKeepsTheId) {
+  Host host;
+  const AssetId asset = host.add(sphere());
+  host.plan();
+  const unsigned id = host.runtime().geometry_id();
+  RayContext context;
+  RTCRayHit hit;
+  EXPECT_FALSE(host.trace({5, 0, 10}, {0, 0, -1}, context, hit));
+  mat4x3 moved(1.0f);
+  moved[3] = vec3(5, 0, 0);
+  ASSERT_TRUE(host.runtime().add_instance(asset, moved));
+  host.plan();
+  EXPECT_EQ(host.runtime().geometry_id(), id);
+  ASSERT_TRUE(host.trace({5, 0, 10}, {0, 0, -1}, context, hit));
+  EXPECT_EQ(hit.hit.primID, 1u);
+  EXPECT_FALSE(host.runtime().attach(nullptr));
+}
+
+TEST_F(RuntimeTest, ASceneWithoutInstancesIsEmpty) {
+  Host host;
+  host.plan();
+  RayContext context;
+  RTCRayHit hit;
+  EXPECT_FALSE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));
+}
+
+TEST_F(RuntimeTest, OriginsFarFromZeroDoNotCostPrecision) {
+  const TemporaryFolder folder;
+  write_asset(folder.path() / "far.farfield", white_sphere(16), dvec3(1e7, -3e7, 1e7));
+  Host host(with_lambda(0.0f));
+  mat4x3 back(1.0f);
+  back[3] = vec3(-1e7f, 3e7f, -1e7f);
+  const AssetId asset = host.add(folder.path() / "far.farfield", {back});
+  vec3 lower, upper;
+  host.runtime().bounds(asset, lower, upper);
+  EXPECT_NEAR(lower.x, 1e7f, 4.0f);
+  host.plan();
+  RayContext context;
+  RTCRayHit hit;
+  ASSERT_TRUE(host.trace({0.1f, 0.2f, 10}, {0, 0, -1}, context, hit));
+  EXPECT_NEAR(hit.ray.tfar, 10 - std::sqrt(1 - 0.05f), 0.02f);
+}
+
+// --- Plans -----------------------------------------------------------------------------------------------------------
+
+TEST_F(RuntimeTest, PlanningNeedsACameraUnlessLambdaIsForced) {
+  Host host;
+  host.add(sphere());
+  const auto plan = host.runtime().plan_frame();
+  ASSERT_FALSE(plan);
+  EXPECT_EQ(plan.error().code, ErrorCode::InvalidArgument);
+  Host forced(with_lambda(1.0f));
+  forced.add(sphere());
+  const auto forced_plan = forced.runtime().plan_frame();
+  ASSERT_TRUE(forced_plan);
+  EXPECT_EQ(forced_plan->finest_level[0], 1u);
+}
+
+TEST_F(RuntimeTest, TheNearerTheCameraTheFinerThePlan) {
+  Host host;
+  host.add(sphere());
+  uint32_t last = 0;
+  std::vector<bool> seen(6, false);
+  for (float distance = 2.0f; distance < 5000.0f; distance *= 1.3f) {
+    const uint32_t finest = host.plan(vec3(0, 0, distance)).finest_level[0];
+    EXPECT_GE(finest, last);
+    last = finest;
+    seen[finest] = true;
+  }
+  EXPECT_EQ(seen, (std::vector<bool>{true, true, true, true, false, true}));
+}
+
+TEST_F(RuntimeTest, LodScaleAndInstanceScaleMoveTheLevel) {
+  const auto finest = [](float lod_scale, float instance_scale) {
+    RuntimeOptions options;
+    options.lod_scale = lod_scale;
+    Host host(options);
+    host.add(sphere(), {mat4x3(instance_scale)});
+    return host.plan(vec3(0, 0, 1000), 0.1e-3f).finest_level[0];  // 0.1 wide: lambda 2.3 at scale 1
+  };
+  EXPECT_EQ(finest(1.0f, 1.0f), 2u);
+  EXPECT_EQ(finest(0.5f, 1.0f), 1u);
+  EXPECT_EQ(finest(2.0f, 1.0f), 3u);
+  EXPECT_EQ(finest(1.0f, 2.0f), 1u);
+  EXPECT_EQ(finest(1.0f, 0.5f), 3u);
+}
+
+TEST_F(RuntimeTest, MoreBudgetNeverGivesACoarserPlanAndTheBudgetAlwaysHolds) {
+  double last_bias = 1e9;
+  bool saw_coarse = false, saw_finest = false;
+  for (uint64_t budget = 300 << 10; budget < (64 << 20); budget = budget * 5 / 4) {
+    Host host(with_budget(budget));
+    const auto asset = host.runtime().open_asset(sphere().string());
+    if (!asset) continue;
+    ASSERT_TRUE(host.runtime().add_instance(*asset, mat4x3(1.0f)));
+    const PlanSummary plan = host.plan(vec3(0, 0, 5));
+    EXPECT_LE(plan.planned_bytes, budget);
+    EXPECT_LE(plan.bias, last_bias);
+    last_bias = plan.bias;
+    saw_coarse = saw_coarse || plan.finest_level[0] >= 3;
+    saw_finest = saw_finest || plan.finest_level[0] == 0;
+    hash_of_hits(host, 0.1f);  // loads what the plan allows
+    const Stats stats = host.runtime().stats();
+    EXPECT_LE(stats.peak_accounted_bytes, budget);
+    EXPECT_LE(stats.accounted_bytes, plan.planned_bytes);
+    EXPECT_EQ(stats.fallbacks, 0u);
+    EXPECT_TRUE(host.messages.empty()) << host.messages[0];
+  }
+  EXPECT_TRUE(saw_coarse && saw_finest);
+}
+
+TEST_F(RuntimeTest, MovingAwayReleasesAndComingBackReloads) {
+  Host host;
+  host.add(sphere());
+  host.plan(vec3(0, 0, 5));
+  const uint64_t near_hash = hash_of_hits(host);
+  const uint64_t near_bytes = host.runtime().stats().accounted_bytes;
+  host.plan(vec3(0, 0, 5000));
+  const Stats far = host.runtime().stats();
+  EXPECT_LT(far.accounted_bytes, near_bytes / 2);
+  EXPECT_EQ(far.levels_resident, 1u);
+  EXPECT_GT(far.levels_released, 0u);
+  hash_of_hits(host);
+  host.plan(vec3(0, 0, 5));
+  EXPECT_EQ(hash_of_hits(host), near_hash);
+}
+
+TEST_F(RuntimeTest, PrefetchLoadsWhatCameraRaysNeed) {
+  Host host;
+  host.add(sphere());
+  host.plan(vec3(0, 0, 40));  // 0.04 wide: lambda just below 1
+  host.runtime().prefetch();
+  const uint64_t loaded = host.runtime().stats().levels_loaded;
+  EXPECT_EQ(loaded, 3u);  // root, 0, 1
+  hash_of_hits(host);
+  EXPECT_EQ(host.runtime().stats().levels_loaded, loaded);
+}
+
+TEST_F(RuntimeTest, OpeningAnotherAssetMakesRoomForItsRoot) {
+  const auto other = copy("second.farfield");
+  // The budget holds the first sphere whole, or both roots, but not the first sphere and a second root.
+  Host probe;
+  probe.add(sphere());
+  const uint64_t whole = probe.plan(vec3(0, 0, 2)).planned_bytes;
+  Host host(with_budget(whole + 1000));
+  host.add(sphere());
+  host.plan(vec3(0, 0, 2));
+  hash_of_hits(host, 0.3f);
+  const auto opened = host.runtime().open_asset(other.string());
+  ASSERT_TRUE(opened) << opened.error().message;
+  EXPECT_LE(host.runtime().stats().peak_accounted_bytes, whole + 1000);
+  host.plan(vec3(0, 0, 2));
+  hash_of_hits(host);
+  EXPECT_LE(host.runtime().stats().peak_accounted_bytes, whole + 1000);
+}
+
+// --- What rays see ---------------------------------------------------------------------------------------------------
+
+TEST_F(RuntimeTest, ThreadsTemperatureAndBudgetDoNotChangeWhatRaysSee) {
+  const auto hash = [](int threads, bool prefetch, uint64_t budget) {
+    const ThreadLimit limit(threads);
+    Host host(with_budget(budget));
+    host.add(sphere(), {mat4x3(1.0f), mat4x3(0.4f)});
+    host.plan(vec3(0, 0, 25));
+    if (prefetch) host.runtime().prefetch();
+    const uint64_t cold = hash_of_hits(host, 0.02f);
+    EXPECT_EQ(hash_of_hits(host, 0.02f), cold);  // warm
+    return cold;
+  };
+  const uint64_t reference = hash(1, false, 1 << 30);
+  EXPECT_EQ(hash(0, false, 1 << 30), reference);
+  EXPECT_EQ(hash(4, true, 1 << 30), reference);
+  EXPECT_EQ(hash(0, false, 64 << 20), reference);  // the same plan in less memory
+}
+
+TEST_F(RuntimeTest, ABrokenLevelIsReportedOnceAndTheNextCoarserServes) {
+  const auto broken = copy("broken.farfield");
+  const uint64_t size = std::filesystem::file_size(broken / "level_1.ffl");
+  Host host(with_lambda(1.0f));
+  host.add(broken);
+  host.plan();
+  flip_byte(broken / "level_1.ffl", size / 2);  // after open_asset, before the first ray
+  hash_of_hits(host);
+  ASSERT_EQ(host.messages.size(), 1u);
+  EXPECT_NE(host.messages[0].find("level 1"), std::string::npos) << host.messages[0];
+  EXPECT_NE(host.messages[0].find("level_1.ffl"), std::string::npos) << host.messages[0];
+  EXPECT_GT(host.runtime().stats().fallbacks, 1000u);
+
+  RayContext context;
+  RTCRayHit hit;
+  ASSERT_TRUE(host.trace({0, 0, 10}, {0.01f, 0, -1}, context, hit));
+  EXPECT_EQ(host.interaction(hit, context).level, 2u);
+  host.plan();
+  hash_of_hits(host);
+  EXPECT_EQ(host.messages.size(), 1u);
+}
+
+TEST_F(RuntimeTest, ProgressiveRaysUseTheRootFirstAndThePlanInTheEnd) {
+  RuntimeOptions options;
+  options.residency = Residency::Progressive;
+  Host host(options);
+  host.add(sphere());
+  host.plan(vec3(0, 0, 5));
+  hash_of_hits(host);
+  EXPECT_GT(host.runtime().stats().fallbacks, 0u);
+
+  Host wait;
+  wait.add(sphere());
+  wait.plan(vec3(0, 0, 5));
+  const uint64_t expected = hash_of_hits(wait);
+  for (int i = 0; i < 2000 && hash_of_hits(host) != expected; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  EXPECT_EQ(hash_of_hits(host), expected);
+  host.plan(vec3(0, 0, 5000));  // drops loads that wait and levels that are there
+  host.plan(vec3(0, 0, 5));
+  host.runtime().prefetch();
+  host.plan(vec3(0, 0, 5000));
+}
+
+TEST_F(RuntimeTest, JustBelowAndAboveAnIntegerLambdaRaysSeeTheSame) {
+  // Same seeds; lambda 1 -+ 1e-3: one path in a thousand may see another level, on either side.
+  const auto levels_seen = [](float lambda) {
+    Host host(with_lambda(lambda));
+    host.add(sphere());
+    host.plan();
+    std::vector<float> seen;
+    for (uint32_t i = 0; i < 20000; ++i) {
+      Rng rng(i);
+      const vec3 direction = testing::random_unit(rng);
+      RayContext context;
+      context.path_seed = rng.next_uint();
+      context.ray_seed = rng.next_uint();
+      RTCRayHit hit;
+      const bool is_hit = host.trace(0.9f * testing::random_unit(rng) - 5.0f * direction, direction, context, hit);
+      seen.push_back(is_hit ? hit.ray.tfar + static_cast<float>(context.hit.level_slot) : -1.0f);
+    }
+    return seen;
+  };
+  for (const float integer : {1.0f, 2.0f, 3.0f, 5.0f}) {
+    const std::vector<float> below = levels_seen(integer - 1e-3f);
+    const std::vector<float> above = levels_seen(integer + 1e-3f);
+    int different = 0;
+    for (size_t i = 0; i < below.size(); ++i) different += below[i] != above[i];
+    EXPECT_LE(different, 80) << integer;  // expected 40 in 20000
+  }
+}
+
+// --- Interactions ----------------------------------------------------------------------------------------------------
+
+TEST_F(RuntimeTest, InteractionsSayWhereAndHow) {
+  Host host(with_lambda(0.0f));
+  mat4x3 transform(2.0f);
+  transform[3] = vec3(1, 2, 3);
+  host.add(sphere(), {transform});
+  host.plan();
+  RayContext context;
+  context.cone_width = 0.01f;
+  context.cone_spread = 0.001f;
+  RTCRayHit hit;
+  ASSERT_TRUE(host.trace({1, 2, 13}, {0, 0.01f, -1}, context, hit));
+  const Interaction interaction = host.interaction(hit, context);
+  EXPECT_EQ(interaction.kind, Interaction::Kind::Surface);
+  EXPECT_NEAR(glm::length(interaction.position - vec3(1, 2, 3)), 2.0f, 0.01f);
+  EXPECT_NEAR(glm::dot(interaction.geometric_normal, vec3(0, 0, 1)), 1.0f, 0.01f);
+  EXPECT_NEAR(glm::length(interaction.wo), 1.0f, 1e-5f);
+  EXPECT_NEAR(interaction.footprint, 0.01f + 0.001f * hit.ray.tfar, 1e-6f);
+  EXPECT_EQ(interaction.level, 0u);
+  EXPECT_EQ(interaction.instance, 0u);
+  EXPECT_NEAR(interaction.albedo.x, 1.0f, 1e-5f);
+
+  // From inside, the normal is on the other side.
+  ASSERT_TRUE(host.trace({1, 2, 3}, {0, 0.01f, -1}, context, hit));
+  EXPECT_NEAR(host.interaction(hit, context).geometric_normal.z, 1.0f, 0.01f);
+}
+
+TEST_F(RuntimeTest, SurfacesAndBlocksOfAlbedoOneAreWhiteFurnaces) {
+  Rng transforms(21);
+  for (const float lambda : {0.0f, 1.0f, 1.5f, 2.0f, 3.0f, 5.0f}) {
+    Host host(with_lambda(lambda));
+    mat4x3 transform;
+    for (int column = 0; column < 3; ++column)
+      transform[column] = (0.5f + transforms.next()) * testing::random_unit(transforms);
+    transform[3] = vec3(3, -2, 1);
+    host.add(sphere(), {transform});
+    host.plan();
+    double sum = 0, sum_squares = 0;
+    int hits = 0, open_paths = 0;
+    constexpr int kPaths = 4000;
+    for (uint32_t path = 0; path < kPaths; ++path) {
+      Rng rng(path, 3);
+      vec3 direction = testing::random_unit(rng);
+      vec3 origin = vec3(3, -2, 1) + 0.3f * testing::random_unit(rng) - 8.0f * direction;
+      vec3 throughput(1.0f);
+      RayContext context;
+      context.path_seed = path;
+      int events = 0;
+      for (; events < 3000; ++events) {
+        context.ray_seed = rng.next_uint();
+        RTCRayHit hit;
+        if (!host.trace(origin, direction, context, hit)) break;
+        const Interaction interaction = host.interaction(hit, context);
+        const ScatterSample sample = interaction.sample(rng);
+        throughput *= sample.weight;
+        ASSERT_TRUE(is_finite(throughput));
+        if (max_component(throughput) == 0.0f) break;
+        origin = interaction.ray_origin(sample.wi);
+        direction = sample.wi;
+        context.set_origin(context.hit);
+      }
+      open_paths += events == 3000;
+      hits += events > 0;
+      sum += throughput.x;
+      sum_squares += throughput.x * throughput.x;
+    }
+    EXPECT_GT(hits, kPaths / 3) << lambda;
+    EXPECT_LE(open_paths, 2) << lambda;  // trapped by leaks into the mesh
+    const double mean = sum / kPaths;
+    const double error = std::sqrt(std::max(0.0, sum_squares / kPaths - mean * mean) / kPaths);
+    EXPECT_NEAR(mean, 1.0, 4.0 * error + 2e-3) << lambda;
+  }
+}
+
+TEST_F(RuntimeTest, RaysThatLeaveASurfaceDoNotMeetItAgain) {
+  Rng rng(31);
+  for (int i = 0; i < 30; ++i) {
+    Host host(with_lambda(0.0f));
+    mat4x3 transform;
+    const float size = std::pow(10.0f, 6.0f * rng.next() - 3.0f);
+    do {
+      for (int column = 0; column < 3; ++column)
+        transform[column] = size * (0.3f + rng.next()) * testing::random_unit(rng);
+    } while (std::abs(glm::determinant(mat3(transform))) < 0.05f * size * size * size);
+    // Up to 1e3 sizes away from the origin of the world; in the last cases 1e7 units.
+    const float far = i < 25 ? 1e3f * size * rng.next() : 1e7f;
+    if (i >= 25) {
+      for (int column = 0; column < 3; ++column) transform[column] *= 1e5f / size;
+    }
+    transform[3] = far * testing::random_unit(rng);
+    const float radius = i < 25 ? size : 1e5f;
+    host.add(sphere(), {transform});
+    host.plan();
+    int self_hits = 0, rays = 0;
+    for (int k = 0; k < 500; ++k) {
+      const vec3 direction = testing::random_unit(rng);
+      RayContext context;
+      RTCRayHit hit;
+      if (!host.trace(transform[3] - 4.0f * radius * direction, direction, context, hit)) continue;
+      const Interaction interaction = host.interaction(hit, context);
+      ASSERT_TRUE(is_finite(interaction.position) && is_finite(interaction.geometric_normal));
+      for (int out = 0; out < 4; ++out) {
+        vec3 wi = testing::random_unit(rng);
+        if (glm::dot(wi, interaction.geometric_normal) < 0.0f) wi = -wi;
+        RayContext next;
+        next.set_origin(context.hit);
+        RTCRayHit again;
+        ++rays;
+        // A sphere is convex: whatever leaves it meets nothing. Its facets are nearly so.
+        self_hits += host.trace(interaction.ray_origin(wi), wi, next, again);
+      }
+    }
+    EXPECT_GT(rays, 500);
+    EXPECT_EQ(self_hits, 0) << "transform " << i << " size " << size << " at " << far;
+  }
+}
+
+TEST_F(RuntimeTest, ConesWidenWithTheLobe) {
+  Host host(with_lambda(0.0f));
+  host.add(sphere());
+  host.plan();
+  RayContext context;
+  RTCRayHit hit;
+  ASSERT_TRUE(host.trace({0, 0, 10}, {0.01f, 0, -1}, context, hit));
+  const Interaction interaction = host.interaction(hit, context);
+  ScatterSample sample;
+  float last = 10.0f;
+  for (const float pdf : {1e-6f, 0.08f, 0.3f, 1.0f, 100.0f, 1e8f, std::numeric_limits<float>::infinity()}) {
+    sample.pdf = pdf;
+    const float spread = interaction.next_cone_spread(sample, 0.01f);
+    EXPECT_GE(spread, 0.01f);
+    EXPECT_LE(spread, 1.01f);
+    EXPECT_LE(spread, last);
+    last = spread;
+  }
+  sample.pdf = kInvPi;
+  EXPECT_NEAR(interaction.next_cone_spread(sample, 0.0f), 0.25f, 1e-4f);
+  sample.pdf = 0.0f;
+  EXPECT_EQ(interaction.next_cone_spread(sample, 0.5f), 0.5f);
+}
+
+}  // namespace
+}  // namespace farfield
