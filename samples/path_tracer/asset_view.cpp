@@ -70,10 +70,4 @@ Result<ViewImages> AssetView::render(const ViewOptions& options, const Lights& l
   return ViewImages{select_channels(film.image(), {"R", "G", "B", "A"}), {film.half(0), film.half(1)}};
 }
 
-SunSkyOptions default_sun_sky() {
-  SunSkyOptions options;
-  options.sun_direction = glm::normalize(vec3(0.6f, 0.72f, 0.6f));
-  return options;
-}
-
 }  // namespace farfield

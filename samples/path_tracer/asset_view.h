@@ -58,7 +58,4 @@ class AssetView {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The light that evaluate uses when none is given: sun 40 degrees above the horizon, from the south-east.
-SunSkyOptions default_sun_sky();
-
 }  // namespace farfield

@@ -91,6 +91,12 @@ float cleaned(float texel) { return texel > 0 && std::isfinite(texel) ? texel : 
 
 }  // namespace
 
+SunSkyOptions default_sun_sky() {
+  SunSkyOptions options;
+  options.sun_direction = glm::normalize(vec3(0.6f, 0.72f, 0.6f));
+  return options;
+}
+
 struct Environment::Impl {
   LatLongGrid grid;
   LatLongDistribution cells;

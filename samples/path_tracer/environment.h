@@ -37,6 +37,9 @@ struct SunSkyOptions {
   float ground_albedo = 0.2f;
 };
 
+/// The light where none is given, and that evaluate uses: a sun 40 degrees above the horizon.
+SunSkyOptions default_sun_sky();
+
 /// Radiance from infinity with importance sampling. Immutable; any thread may use it. Copies share their tables.
 class Environment {
  public:

@@ -42,26 +42,34 @@ struct RenderOptions {
 /// What a frame took. Bytes are the process's and the budget's; see ShotReport.
 struct FrameReport {
   int frame = 0;
-  double seconds = 0;       ///< wall time of plan, prefetch and render
-  double load_seconds = 0;  ///< of it, summed over loads of levels: map, check, build
-  uint64_t accounted_bytes = 0;
-  uint64_t rss_bytes = 0;              ///< of the process after the frame
+  double seconds = 0;            ///< wall time of plan, prefetch and render
+  double load_seconds = 0;       ///< of it, summed over loads of levels: map, check, build
+  uint64_t accounted_bytes = 0;  ///< that the runtime counts against the budget, after the frame
+  uint64_t rss_bytes = 0;        ///< of the process after the frame
+  uint64_t levels_loaded = 0;
+  uint64_t fallbacks = 0;  ///< rays served by a coarser level than planned
+  uint64_t rays = 0;
+  uint64_t invalid_samples = 0;        ///< paths whose value was not finite; black in the image
   double bias = 0;                     ///< PlanSummary::bias
-  std::vector<uint32_t> finest_level;  ///< per asset, as PlanSummary
+  std::vector<uint32_t> finest_level;  ///< per asset of RenderReport::assets: finest level that rays may use
 };
 
 struct RenderReport {
-  std::vector<std::string> assets;  ///< names of the scene's meshes, in the order of FrameReport::finest_level
+  std::vector<std::string> assets;  ///< names of the meshes that are shown
   uint64_t budget_bytes = 0;
   uint64_t baseline_rss_bytes = 0;    ///< of the process before it opened the assets
   uint64_t peak_rss_bytes = 0;        ///< highest since then
   uint64_t peak_accounted_bytes = 0;  ///< highest that the runtime counted against the budget
-  std::vector<FrameReport> frames;
+  std::vector<FrameReport> frames;    ///< those that are finished, in order
 };
 
 /// Renders one frame to `out` (EXR with all AOVs and metadata) and to the PNG beside it.
 /// frame: n is the scene at n / 24 s (or at the frame rate of its animation, see GltfScene::frames_per_second). Errors:
 /// those of the scene, the bake, the runtime, the files; Cancelled.
 Result<RenderReport> render_frame(const RenderOptions& options, int frame, const std::filesystem::path& out);
+
+/// Writes an image to `exr` with its metadata, and as a PNG preview beside it. Errors: those of write_exr, write_png.
+Result<void> write_frame(const std::filesystem::path& exr, const Image& image, const Metadata& metadata,
+                         float exposure_stops);
 
 }  // namespace farfield

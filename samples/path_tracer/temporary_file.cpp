@@ -4,10 +4,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
-#include <fstream>
 #include <system_error>
 
 namespace farfield {
@@ -29,17 +25,6 @@ Result<void> TemporaryFile::commit() {
   if (error) return make_error(ErrorCode::Io, fmt::format("cannot write {}: {}", target_.string(), error.message()));
   path_.clear();
   return {};
-}
-
-Result<void> write_text_file(const std::filesystem::path& path, const std::string& text) {
-  TemporaryFile temporary(path);
-  {
-    std::ofstream file(temporary.path(), std::ios::binary);
-    file << text << std::flush;
-    if (!file)
-      return make_error(ErrorCode::Io, fmt::format("cannot write {}: {}", path.string(), std::strerror(errno)));
-  }
-  return temporary.commit();
 }
 
 }  // namespace farfield

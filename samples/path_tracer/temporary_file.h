@@ -3,7 +3,6 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
 
 #include "base/result.h"
 
@@ -25,8 +24,5 @@ class TemporaryFile {
   std::filesystem::path target_;
   std::filesystem::path path_;
 };
-
-/// Writes text to a file through a TemporaryFile. Errors: Io.
-Result<void> write_text_file(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace farfield

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "samples/path_tracer/shot_job.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <system_error>
+
+#include "cache/file_io.h"
+#include "samples/path_tracer/frame_renderer.h"
+#include "samples/path_tracer/image.h"
+#include "samples/path_tracer/shot_record.h"
+
+namespace farfield {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr uint64_t kMostRecordBytes = 256 << 20;
+constexpr int kSheetWidth = 1920;  ///< pixels, at most
+
+fs::path frame_path(const fs::path& folder, int frame) { return folder / fmt::format("frame_{:04}.exr", frame); }
+
+Result<void> write_record(const fs::path& path, const ShotRecord& record) {
+  const std::string text = to_json(record);
+  const std::span<const std::byte> piece = std::as_bytes(std::span(text));
+  return write_file_atomically(path, {&piece, 1});
+}
+
+bool in_range(const FrameRange& frames, int frame) {
+  return frame >= frames.first && frame <= frames.last && (frame - frames.first) % frames.step == 0;
+}
+
+// What an earlier run of the same shot finished, of the frames wanted now. Empty if it was another shot.
+RenderReport finished_before(const fs::path& folder, const std::string& fingerprint, const FrameRange& frames) {
+  const auto text = read_small_file(folder / "shot.json", kMostRecordBytes);
+  const auto record = text ? shot_record_from_json(*text) : std::nullopt;
+  if (!record || record->fingerprint != fingerprint) return {};
+  RenderReport report = record->report;
+  std::erase_if(report.frames, [&](const FrameReport& frame) {
+    std::error_code ignored;
+    return !in_range(frames, frame.frame) || !fs::exists(frame_path(folder, frame.frame), ignored);
+  });
+  return report.frames.empty() ? RenderReport() : report;
+}
+
+std::vector<int> frames_to_render(const FrameRange& frames, const RenderReport& finished) {
+  std::vector<int> missing;
+  for (int frame = frames.first; frame <= frames.last; frame += frames.step) {
+    const bool is_there = std::any_of(finished.frames.begin(), finished.frames.end(),
+                                      [&](const FrameReport& report) { return report.frame == frame; });
+    if (!is_there) missing.push_back(frame);
+  }
+  return missing;
+}
+
+// As square as whole rows allow, frames scaled down by a whole factor so that a row fits.
+ContactSheet make_sheet(const FrameRange& frames, int width, int height) {
+  const int columns = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(frames.count()))));
+  const int factor = std::max(1, (width * columns + kSheetWidth - 1) / kSheetWidth);
+  return ContactSheet(frames.count(), columns, (width + factor - 1) / factor, (height + factor - 1) / factor);
+}
+
+int sheet_cell(const FrameRange& frames, int frame) { return (frame - frames.first) / frames.step; }
+
+}  // namespace
+
+Result<FrameRange> parse_frame_range(const std::string& text) {
+  FrameRange range;
+  const char* at = text.data();
+  const char* const end = text.data() + text.size();
+  const auto number = [&](int& value) {
+    const auto [next, error] = std::from_chars(at, end, value);
+    at = next;
+    return error == std::errc() && value >= 0;
+  };
+  const auto skip = [&](char c) { return at != end && *at == c && ++at; };
+
+  bool good = number(range.first);
+  range.last = range.first;
+  if (good && skip('-')) good = number(range.last);
+  if (good && skip(':')) good = number(range.step);
+  if (!good || at != end || range.last < range.first || range.step < 1 || range.last > (1 << 24))
+    return make_error(ErrorCode::InvalidArgument,
+                      fmt::format("\"{}\" is not a range of frames like 0-120, 0-120:10 or 60", text));
+  return range;
+}
+
+Result<RenderReport> render_shot(const RenderOptions& options, const FrameRange& frames, const fs::path& out) {
+  std::error_code error;
+  fs::create_directories(out, error);
+  if (error) return make_error(ErrorCode::Io, fmt::format("cannot create {}: {}", out.string(), error.message()));
+  const auto renderer = FrameRenderer::prepare(options);
+  if (!renderer) return tl::unexpected(renderer.error());
+  const std::string& fingerprint = (*renderer)->fingerprint();
+
+  // The sheet and the frames of an earlier run are read before memory is measured.
+  ContactSheet sheet = make_sheet(frames, options.width, options.height);
+  RenderReport earlier = finished_before(out, fingerprint, frames);
+  for (const FrameReport& frame : earlier.frames) {
+    const auto file = read_exr(frame_path(out, frame.frame));
+    if (!file) return tl::unexpected(file.error());
+    sheet.set(sheet_cell(frames, frame.frame), file->image);
+  }
+  const std::vector<int> missing = frames_to_render(frames, earlier);
+  if (options.message && !earlier.frames.empty())
+    options.message(fmt::format("{} of {} frames are finished already", earlier.frames.size(), frames.count()));
+
+  RenderReport report = earlier;
+  const auto take_frame = [&](const Image& image, const Metadata& metadata, const RenderReport& so_far) {
+    const int frame = so_far.frames.back().frame;
+    if (auto written = write_frame(frame_path(out, frame), image, metadata, options.exposure_stops); !written)
+      return written;
+    sheet.set(sheet_cell(frames, frame), image);
+    report = join_reports(earlier, so_far);
+    return write_record(out / "shot.json", {fingerprint, report});
+  };
+  if (!missing.empty()) {
+    const auto rendered = (*renderer)->render(missing, take_frame);
+    if (!rendered) return tl::unexpected(rendered.error());
+    report = join_reports(earlier, *rendered);
+    // Writing the last frame may have been the peak.
+    if (auto written = write_record(out / "shot.json", {fingerprint, report}); !written)
+      return tl::unexpected(written.error());
+  }
+  if (auto written = write_png(out / "contact_sheet.png", sheet.image(), {options.exposure_stops}); !written)
+    return tl::unexpected(written.error());
+  return report;
+}
+
+}  // namespace farfield

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "samples/path_tracer/shot_record.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+namespace farfield {
+namespace {
+
+FrameReport frame_report(int frame) {
+  FrameReport report;
+  report.frame = frame;
+  report.seconds = 1.5 + frame;
+  report.load_seconds = 0.25;
+  report.accounted_bytes = uint64_t{5} << 32;
+  report.rss_bytes = 1000;
+  report.levels_loaded = 3;
+  report.rays = uint64_t{1} << 40;
+  report.bias = 0.125;
+  report.finest_level = {1, 4};
+  return report;
+}
+
+ShotRecord sample_record() {
+  ShotRecord record;
+  record.fingerprint = "size 4x4 \"quoted\"";
+  record.report.assets = {"maple", "ground"};
+  record.report.budget_bytes = uint64_t{6} << 32;
+  record.report.baseline_rss_bytes = 100;
+  record.report.peak_rss_bytes = 180;
+  record.report.peak_accounted_bytes = 70;
+  record.report.frames = {frame_report(0), frame_report(10)};
+  return record;
+}
+
+TEST(ShotRecord, HasTheKeysThatChecksRead) {
+  const auto json = nlohmann::json::parse(to_json(sample_record()));
+  EXPECT_EQ(json["budget_bytes"], uint64_t{6} << 32);
+  EXPECT_EQ(json["baseline_rss_bytes"], 100);
+  EXPECT_EQ(json["peak_rss_bytes"], 180);
+  EXPECT_EQ(json["peak_accounted_bytes"], 70);
+  ASSERT_EQ(json["frames"].size(), 2u);
+  const auto& frame = json["frames"][1];
+  EXPECT_EQ(frame["frame"], 10);
+  EXPECT_EQ(frame["seconds"], 11.5);
+  EXPECT_EQ(frame["load_seconds"], 0.25);
+  EXPECT_EQ(frame["accounted_bytes"], uint64_t{5} << 32);
+  EXPECT_EQ(frame["bias"], 0.125);
+  EXPECT_EQ(frame["finest_level"]["ground"], 4);
+}
+
+TEST(ShotRecord, ComesBackAsItWasWritten) {
+  const std::string text = to_json(sample_record());
+  const auto record = shot_record_from_json(text);
+  ASSERT_TRUE(record);
+  EXPECT_EQ(to_json(*record), text);
+  EXPECT_EQ(record->fingerprint, sample_record().fingerprint);
+}
+
+TEST(ShotRecord, OtherTextIsNoRecord) {
+  const std::string text = to_json(sample_record());
+  for (size_t size = 0; size + 2 < text.size(); size += 7) EXPECT_FALSE(shot_record_from_json(text.substr(0, size)));
+  EXPECT_FALSE(shot_record_from_json("[]"));
+  EXPECT_FALSE(shot_record_from_json("{\"frames\": 3}"));
+  EXPECT_FALSE(shot_record_from_json(std::string(10000, '[')));
+}
+
+TEST(JoinReports, SortsFramesAndKeepsTheLargerUseOfMemory) {
+  RenderReport earlier = sample_record().report, later = sample_record().report;
+  later.frames = {frame_report(5)};
+  later.baseline_rss_bytes = 300;
+  later.peak_rss_bytes = 330;
+  later.peak_accounted_bytes = 90;
+  const RenderReport joined = join_reports(earlier, later);
+  EXPECT_EQ(joined.baseline_rss_bytes, 100u);
+  EXPECT_EQ(joined.peak_rss_bytes, 180u);
+  EXPECT_EQ(joined.peak_accounted_bytes, 90u);
+  ASSERT_EQ(joined.frames.size(), 3u);
+  EXPECT_EQ(joined.frames[1].frame, 5);
+}
+
+TEST(JoinReports, NothingJoinsWithSomethingToThatThing) {
+  const RenderReport report = sample_record().report;
+  EXPECT_EQ(to_json({"", join_reports({}, report)}), to_json({"", report}));
+  EXPECT_EQ(to_json({"", join_reports(report, {})}), to_json({"", report}));
+}
+
+}  // namespace
+}  // namespace farfield
