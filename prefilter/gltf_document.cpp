@@ -95,6 +95,14 @@ std::string first_line(const std::string& text) {
   return line.empty() ? "not a glTF file" : line;
 }
 
+/// Names the compression that a file says it uses, or "". Such a file need not require it, and still not parse without.
+std::string used_compression(const Model& model) {
+  for (const std::string& name : model.extensionsUsed) {
+    if (name.find("compression") != std::string::npos) return name;
+  }
+  return "";
+}
+
 /// Names all required extensions that we do not know, or "".
 std::string unknown_extensions(const Model& model) {
   std::string names;
@@ -310,7 +318,8 @@ Result<GltfDocument> open_gltf(std::span<const unsigned char> bytes, const fs::p
     error = exception.what();
   }
   // First of all: an unknown compression also makes the parse fail, with a less helpful message.
-  if (const std::string names = unknown_extensions(document.model); !names.empty()) {
+  const std::string required = unknown_extensions(document.model);
+  if (const std::string names = ok || !required.empty() ? required : used_compression(document.model); !names.empty()) {
     return make_error(ErrorCode::Unsupported,
                       fmt::format("{}: requires {}, which is not supported; export without it", document.name, names));
   }

@@ -78,7 +78,9 @@ Result<Image> decode_image(std::span<const unsigned char> bytes, const std::stri
   if (extension.empty()) {
     return make_error(ErrorCode::Unsupported, fmt::format("{}: not a PNG, JPEG, WebP or EXR image", name));
   }
-  const auto input = OIIO::ImageInput::open("image" + extension, &config, &reader);
+  OIIO::Filesystem::IOProxy* proxy = &reader;
+  config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
+  const auto input = OIIO::ImageInput::open("image" + extension, &config, proxy);
   if (!input) return make_error(ErrorCode::BadFile, fmt::format("{}: {}", name, OIIO::geterror()));
   return read_input(*input, name, use);
 }
