@@ -25,8 +25,9 @@ constexpr size_t kMaxExploredFaces = size_t{1} << 18;
 constexpr double kPatchRadius = 0.125;
 
 /// Length of a triangle's longest edge over the height on it, above which the middle of that edge represents the
-/// triangle better than its centre of mass (thesis 7.2.2).
-constexpr double kElongated = 2.0;
+/// triangle better than its centre of mass (thesis 7.2.2). The halves of a square have 2: both are judged from the
+/// square's middle, so that quads rarely fall apart. An equilateral triangle has 1.15.
+constexpr double kElongated = 1.5;
 
 constexpr int next_corner(int corner) { return corner == 2 ? 0 : corner + 1; }
 
@@ -118,8 +119,11 @@ class BallExplorer {
   }
 
   EdgeCut cut(uint32_t edge) const {
+    return cut(edge, is_inside(edges_.smaller_vertex[edge]), is_inside(edges_.larger_vertex[edge]));
+  }
+
+  EdgeCut cut(uint32_t edge, bool a_inside, bool b_inside) const {
     const uint32_t a = edges_.smaller_vertex[edge], b = edges_.larger_vertex[edge];
-    const bool a_inside = is_inside(a), b_inside = is_inside(b);
     if (a_inside || b_inside) return {true, !a_inside, !b_inside};
     const dvec3 origin = dvec3(surface_.positions[a]) - center_;
     const dvec3 direction = dvec3(surface_.positions[b]) - dvec3(surface_.positions[a]);
@@ -144,14 +148,20 @@ class BallExplorer {
       uint32_t node;
       bool enters;
     };
+    const uvec3& corners = surface_.triangles[face];
+    const std::array<bool, 3> inside = {is_inside(corners.x), is_inside(corners.y), is_inside(corners.z)};
     std::array<Crossing, 6> crossings;
     size_t count = 0;
     for (int c = 0; c < 3; ++c) {
       const uint32_t edge = edges_.face_edges[face][c];
-      const EdgeCut edge_cut = cut(edge);
+      const bool forward = corners[c] == edges_.smaller_vertex[edge];
+      const bool starts_inside = inside[static_cast<size_t>(c)];
+      const bool ends_inside = inside[static_cast<size_t>(next_corner(c))];
+      const EdgeCut edge_cut = forward ? cut(edge, starts_inside, ends_inside) : cut(edge, ends_inside, starts_inside);
       if (!edge_cut.touches) continue;
-      for (const uint32_t neighbour : edges_.faces_of(edge)) explored_.insert(neighbour);
-      const bool forward = surface_.triangles[face][c] == edges_.smaller_vertex[edge];
+      for (const uint32_t neighbour : edges_.faces_of(edge)) {
+        if (neighbour != face) explored_.insert(neighbour);
+      }
       const Crossing at_enter{2 * edge, forward}, at_leave{2 * edge + 1, !forward};
       if (forward && edge_cut.enters) crossings[count++] = at_enter;
       if (edge_cut.leaves) crossings[count++] = at_leave;
@@ -299,7 +309,7 @@ void drop_small_pieces(const Surface& surface, const EdgeTable& edges, double re
 /// Small sub-resolution islands in macrosurfaces join them (7.3): seams cost more than they bring.
 void fill_small_islands(const Surface& surface, const EdgeTable& edges, double resolution,
                         std::vector<uint8_t>& is_macrosurface) {
-  constexpr double kMostly = 0.5;
+  constexpr double kMostly = 0.3;  // the corner of a square, the tip of a leaf
   const std::vector<uint8_t> before = is_macrosurface;
   for (const Piece& piece : connected_pieces(edges, before)) {
     if (piece.is_macrosurface || surrounded_part(surface, edges, before, piece) < kMostly) continue;

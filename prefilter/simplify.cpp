@@ -11,6 +11,7 @@
 
 #include "base/parallel.h"
 #include "cache/level.h"
+#include "prefilter/edge_table.h"
 #include "prefilter/material_filter.h"
 #include "prefilter/vertex_placement.h"
 
@@ -20,8 +21,8 @@ namespace {
 
 constexpr uint32_t kNone = 0xffffffffu;
 
-constexpr double kShortEdge = 0.5;  ///< edges below this part of the resolution collapse (thesis 7.3: about eps / 2)
-constexpr double kLongEdge = 1.0;   ///< and none becomes longer than this part (8.1.1)
+constexpr double kShortEdge = 0.36;  ///< edges below this part of the resolution collapse (thesis 7.3: about eps / 2)
+constexpr double kLongEdge = 1.0;    ///< and none becomes longer than this part (8.1.1)
 constexpr double kMaxDeviation = 0.25;        ///< largest distance to the input, as a part of the resolution (8.1.1)
 constexpr double kPlacementTolerance = 0.01;  ///< of the resolution (8.2.3)
 constexpr double kMinNormalCosine = 0.2;      ///< between a face before and after a collapse
@@ -60,33 +61,15 @@ class CollapsibleMesh {
   std::vector<FaceMaterial> materials;
   std::vector<uint32_t> merged_into;  ///< per vertex: itself while it lives, else a smaller one
   std::vector<uint8_t> is_face_alive;
+  std::vector<uint8_t>
+      is_flipped;                 ///< per face: wound against its neighbours; meaningless across a Moebius strip's seam
   std::vector<uint32_t> version;  ///< per vertex: how often it changed
   std::vector<double> deviation;  ///< per vertex: bound of the distance to the input around it
 
-  /// Call once the arrays of positions and triangles are filled.
-  void build_stars() {
-    merged_into.resize(positions.size());
-    std::iota(merged_into.begin(), merged_into.end(), 0u);
-    is_face_alive.assign(triangles.size(), 1);
-    version.assign(positions.size(), 0);
-    deviation.assign(positions.size(), 0.0);
-    stars_.assign(positions.size(), Star{});
-    for (const uvec3& t : triangles) {
-      for (int c = 0; c < 3; ++c) ++stars_[t[c]].size;
-    }
-    uint32_t begin = 0;
-    for (Star& star : stars_) {
-      star.begin = begin;
-      begin += star.size;
-      star.size = 0;
-    }
-    star_faces_.resize(begin);
-    for (uint32_t face = 0; face < triangles.size(); ++face) {
-      for (int c = 0; c < 3; ++c) {
-        Star& star = stars_[triangles[face][c]];
-        star_faces_[star.begin + star.size++] = face;
-      }
-    }
+  /// Call once the arrays of positions, triangles and materials are filled.
+  void build_topology() {
+    build_stars();
+    find_winding();
   }
 
   /// The living faces around a vertex. Valid until the next merge().
@@ -145,6 +128,64 @@ class CollapsibleMesh {
   struct Star {
     uint32_t begin = 0, size = 0;
   };
+
+  void build_stars() {
+    merged_into.resize(positions.size());
+    std::iota(merged_into.begin(), merged_into.end(), 0u);
+    is_face_alive.assign(triangles.size(), 1);
+    version.assign(positions.size(), 0);
+    deviation.assign(positions.size(), 0.0);
+    stars_.assign(positions.size(), Star{});
+    for (const uvec3& t : triangles) {
+      for (int c = 0; c < 3; ++c) ++stars_[t[c]].size;
+    }
+    uint32_t begin = 0;
+    for (Star& star : stars_) {
+      star.begin = begin;
+      begin += star.size;
+      star.size = 0;
+    }
+    star_faces_.resize(begin);
+    for (uint32_t face = 0; face < triangles.size(); ++face) {
+      for (int c = 0; c < 3; ++c) {
+        Star& star = stars_[triangles[face][c]];
+        star_faces_[star.begin + star.size++] = face;
+      }
+    }
+  }
+
+  /// Lets neighbouring faces agree on a winding, outwards from the first face of each sheet.
+  void find_winding() {
+    const EdgeTable edges = build_edge_table(triangles, positions.size());
+    is_flipped.assign(triangles.size(), 0);
+    std::vector<uint8_t> is_found(triangles.size(), 0);
+    std::vector<uint32_t> front;
+    const auto runs_upwards = [&](uint32_t face, uint32_t edge) {
+      for (int c = 0; c < 3; ++c) {
+        if (edges.face_edges[face][c] == edge) return triangles[face][c] == edges.smaller_vertex[edge];
+      }
+      return false;
+    };
+    for (uint32_t first = 0; first < triangles.size(); ++first) {
+      if (is_found[first]) continue;
+      is_found[first] = 1;
+      front.assign(1, first);
+      while (!front.empty()) {
+        const uint32_t face = front.back();
+        front.pop_back();
+        for (int c = 0; c < 3; ++c) {
+          const uint32_t edge = edges.face_edges[face][c];
+          const auto faces = edges.faces_of(edge);
+          if (faces.size() != 2) continue;
+          const uint32_t neighbour = faces[0] == face ? faces[1] : faces[0];
+          if (is_found[neighbour]) continue;
+          is_found[neighbour] = 1;
+          is_flipped[neighbour] = is_flipped[face] ^ (runs_upwards(face, edge) == runs_upwards(neighbour, edge));
+          front.push_back(neighbour);
+        }
+      }
+    }
+  }
 
   void remove_from_star(uint32_t vertex, uint32_t face) {
     Star& star = stars_[vertex];
@@ -285,14 +326,17 @@ class Simplifier {
     ring_.clear();
     for (const auto* faces : {&kept_, &collapsing_}) {
       for (const uint32_t face : *faces) {
-        const uvec3& t = mesh_.triangles[face];
+        uvec3 t = mesh_.triangles[face];
+        if (mesh_.is_flipped[face]) std::swap(t.y, t.z);
         ring_.before.push_back({position(t.x), position(t.y), position(t.z)});
       }
     }
     for (const uint32_t face : kept_) {
       const uvec3& t = mesh_.triangles[face];
       const int c = t.x == a || t.x == b ? 0 : (t.y == a || t.y == b ? 1 : 2);
-      ring_.after.push_back({position(t[(c + 1) % 3]), position(t[(c + 2) % 3])});
+      uint32_t q = t[(c + 1) % 3], s = t[(c + 2) % 3];
+      if (mesh_.is_flipped[face]) std::swap(q, s);
+      ring_.after.push_back({position(q), position(s)});
     }
     ring_.samples_before = {position(a), position(b), 0.5 * (position(a) + position(b))};
     for (const Spoke& spoke : spokes_a_) {
@@ -316,7 +360,8 @@ class Simplifier {
       return is_valid(a, b, placement) ? std::optional(placement) : std::nullopt;
     };
     if (kind_a_ == VertexKind::Interior && kind_b_ == VertexKind::Interior) {
-      return accept(place_vertex(ring_, 0.5 * (pa + pb), std::nullopt, tolerance));
+      const Placement optimum = place_vertex(ring_, 0.5 * (pa + pb), std::nullopt, tolerance);
+      return accept(keep_vertex(ring_, restore_area(ring_, optimum.position)));
     }
     if (kind_a_ == VertexKind::Curve && kind_b_ == VertexKind::Curve) {
       const dvec3 p = mesh_.positions[curve_neighbour(spokes_a_, b)],
@@ -478,7 +523,7 @@ CollapsibleMesh extract_part(const Surface& surface, const Parts& parts, size_t 
     mesh.triangles.emplace_back(parts.local_vertex[t.x], parts.local_vertex[t.y], parts.local_vertex[t.z]);
     mesh.materials.push_back(surface.materials[face]);
   }
-  mesh.build_stars();
+  mesh.build_topology();
   return mesh;
 }
 

@@ -118,6 +118,35 @@ Placement place_vertex(const CollapseRing& ring, const dvec3& start, const std::
   return {x, std::sqrt(sums.max_distance2)};
 }
 
+dvec3 restore_area(const CollapseRing& ring, const dvec3& x) {
+  // Six times the volume of the tetrahedra over the triangles, seen from x itself: before it is a number, after it is a
+  // linear function of x's displacement, whose gradient is twice the area vector of the ring.
+  constexpr double kFold = 0.1;  // area vector against area at which a ring counts as half folded
+  double volume = 0, area_before = 0;
+  for (const auto& [a, b, c] : ring.before) {
+    const dvec3 area_vector = glm::cross(b - a, c - a);
+    volume += glm::dot(a - x, area_vector);
+    area_before += glm::length(area_vector);
+  }
+  const auto area_after = [&](const dvec3& tip, dvec3* sum) {
+    double area = 0;
+    for (const auto& [q, s] : ring.after) {
+      const dvec3 area_vector = glm::cross(q - tip, s - tip);
+      if (sum) *sum += area_vector;
+      area += glm::length(area_vector);
+    }
+    return area;
+  };
+  dvec3 gradient(0.0);
+  const double area = area_after(x, &gradient);
+  const double damped = squared(gradient) + kFold * kFold * area * area;
+  if (!(damped > 0)) return x;
+  const dvec3 to_same_volume = gradient * (volume / damped);
+  const double gain = area_after(x + to_same_volume, nullptr) - area;
+  if (gain == 0) return x;
+  return x + std::clamp((area_before - area) / gain, 0.0, 1.0) * to_same_volume;
+}
+
 Placement keep_vertex(const CollapseRing& ring, const dvec3& position) {
   return {position, std::sqrt(pair_closest_points(ring, position).max_distance2)};
 }
@@ -144,9 +173,11 @@ dvec3 closest_barycentric(const dvec3& p, const dvec3& a, const dvec3& b, const 
   const double d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
   if (d6 >= 0 && d5 <= d6) return {0, 0, 1};
 
+  // Below this sine of the angle at a, va, vb and vc are mostly rounding.
+  constexpr double kMinSine = 1e-5;
+  const double area2 = squared(glm::cross(ab, ac));
+  if (!(area2 > kMinSine * kMinSine * squared(ab) * squared(ac))) return closest_on_longest_edge(p, a, b, c);
   const double va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
-  const double area2 = va + vb + vc;  // |ab x ac|^2
-  if (!(area2 > 1e-20 * squared(ab) * squared(ac))) return closest_on_longest_edge(p, a, b, c);
   if (vc <= 0 && d1 >= 0 && d3 <= 0) {
     const double t = d1 / (d1 - d3);
     return {1 - t, t, 0};
@@ -159,7 +190,7 @@ dvec3 closest_barycentric(const dvec3& p, const dvec3& a, const dvec3& b, const 
     const double t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
     return {0, 1 - t, t};
   }
-  const double v = vb / area2, w = vc / area2;
+  const double v = vb / (va + vb + vc), w = vc / (va + vb + vc);
   return {1 - v - w, v, w};
 }
 

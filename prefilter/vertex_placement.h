@@ -12,8 +12,8 @@ namespace farfield {
 
 /// The surface around an edge before and after its collapse into a vertex x. All lengths in scene units.
 struct CollapseRing {
-  std::vector<std::array<dvec3, 3>> before;  ///< triangles at either end of the edge
-  std::vector<std::array<dvec3, 2>> after;   ///< triangles that stay: their corners other than x
+  std::vector<std::array<dvec3, 3>> before;  ///< triangles at either end of the edge, wound alike
+  std::vector<std::array<dvec3, 2>> after;   ///< triangles that stay: x and these two corners, wound as before
   std::vector<dvec3> samples_before;         ///< points of the surface before: edge ends, middles of the edges at them
   std::vector<dvec3> neighbours_after;       ///< vertices that share an edge with x
 
@@ -34,6 +34,13 @@ struct Placement {
 /// falls, until it moves by less than `tolerance` [eq. 8.2.2]. The sum never grows. Pure function.
 Placement place_vertex(const CollapseRing& ring, const dvec3& start, const std::optional<PlacementLine>& line,
                        double tolerance);
+
+/// Moves x along the mean normal, at most until the surface encloses the same volume as before, so that its area stays
+/// as near as possible to the area before: the optimum above lies a little inside of curved surfaces, and level by
+/// level they would shrink; with the same volume they would grow. Equal area means that random lines cross the surface
+/// equally often (Cauchy, Crofton). Only for edges away from borders. Where the volume hardly depends on x (folds of
+/// thin sheets), x hardly moves.
+dvec3 restore_area(const CollapseRing& ring, const dvec3& x);
 
 /// The same measure for an x that is given.
 Placement keep_vertex(const CollapseRing& ring, const dvec3& position);

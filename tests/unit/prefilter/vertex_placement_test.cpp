@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prefilter/vertex_placement.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <random>
+
+namespace farfield {
+namespace {
+
+double squared(const dvec3& v) { return glm::dot(v, v); }
+
+dvec3 random_point(std::mt19937& rng) {
+  std::normal_distribution<double> normal;
+  return {normal(rng), normal(rng), normal(rng)};
+}
+
+/// Edge ab in the middle of a triangular grid with unit edges, lifted to a height field.
+CollapseRing grid_ring(const std::function<double(double, double)>& height) {
+  const auto at = [&](double u, double v) {
+    const double x = u + 0.5 * v, y = 0.5 * std::sqrt(3.0) * v;
+    return dvec3(x, y, height(x, y));
+  };
+  const dvec3 a = at(0, 0), b = at(1, 0);
+  const std::array<dvec3, 8> outline = {at(2, 0),  at(1, 1),  at(0, 1),  at(-1, 1),
+                                        at(-1, 0), at(0, -1), at(1, -1), at(2, -1)};
+  CollapseRing ring;
+  for (size_t i = 0; i < 8; ++i) {
+    const dvec3 &q = outline[i], &s = outline[(i + 1) % 8];
+    ring.before.push_back({i >= 2 && i < 6 ? a : b, q, s});
+    ring.after.push_back({q, s});
+    ring.samples_before.push_back(0.5 * ((i >= 2 && i <= 6 ? a : b) + q));
+    ring.neighbours_after.push_back(q);
+  }
+  ring.before.push_back({b, outline[2], a});
+  ring.before.push_back({a, outline[6], b});
+  ring.samples_before.insert(ring.samples_before.end(), {a, b});
+  return ring;
+}
+
+double area_after(const CollapseRing& ring, const dvec3& x) {
+  double area = 0;
+  for (const auto& [q, s] : ring.after) area += 0.5 * glm::length(glm::cross(q - x, s - x));
+  return area;
+}
+
+double area_before(const CollapseRing& ring) {
+  double area = 0;
+  for (const auto& [a, b, c] : ring.before) area += 0.5 * glm::length(glm::cross(b - a, c - a));
+  return area;
+}
+
+TEST(VertexPlacement, ClosestPointIsNoFartherThanAnyPointOfTheTriangle) {
+  std::mt19937 rng(1);
+  std::uniform_real_distribution<double> u;
+  for (int round = 0; round < 2000; ++round) {
+    const dvec3 p = random_point(rng), a = random_point(rng), b = random_point(rng);
+    dvec3 c = random_point(rng);
+    if (round % 10 == 0) c = a + (b - a) * u(rng);  // degenerate
+    if (round % 50 == 0) c = b;
+    const dvec3 bary = closest_barycentric(p, a, b, c);
+    EXPECT_NEAR(bary.x + bary.y + bary.z, 1.0, 1e-12);
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(bary[i] >= -1e-12 && bary[i] <= 1 + 1e-12);
+    const double distance = glm::length(bary.x * a + bary.y * b + bary.z * c - p);
+    for (int i = 0; i <= 8; ++i) {
+      for (int j = 0; i + j <= 8; ++j) {
+        const dvec3 other = (i * 0.125) * a + (j * 0.125) * b + ((8 - i - j) * 0.125) * c;
+        EXPECT_LE(distance, glm::length(other - p) + 1e-9);
+      }
+    }
+  }
+}
+
+TEST(VertexPlacement, OnAPlaneTheOptimumIsInThePlane) {
+  const CollapseRing ring = grid_ring([](double x, double y) { return 2 * x - y; });
+  const Placement placement = place_vertex(ring, {0.3, 0.2, 1.5}, std::nullopt, 1e-9);
+  EXPECT_NEAR(placement.position.z, 2 * placement.position.x - placement.position.y, 1e-6);
+  EXPECT_LT(placement.deviation, 1e-6);
+}
+
+TEST(VertexPlacement, TheOptimumIsNotFartherFromTheSurfaceThanTheStart) {
+  std::mt19937 rng(2);
+  for (int round = 0; round < 50; ++round) {
+    std::normal_distribution<double> normal(0.0, 0.3);
+    const CollapseRing ring = grid_ring([&](double, double) { return normal(rng); });
+    const dvec3 start(0.5, 0.0, normal(rng));
+    const Placement placement = place_vertex(ring, start, std::nullopt, 1e-6);
+    // Every half step lowers the sum of squares, which bounds the largest distance from both sides.
+    const double samples = static_cast<double>(ring.samples_before.size() + ring.neighbours_after.size() + 1);
+    EXPECT_LE(placement.deviation, std::sqrt(samples) * keep_vertex(ring, start).deviation + 1e-9);
+    EXPECT_LT(glm::length(placement.position - start), 2.0);
+  }
+}
+
+TEST(VertexPlacement, ALineHoldsTheVertex) {
+  const CollapseRing ring = grid_ring([](double x, double) { return 0.2 * x * x; });
+  const PlacementLine line{{0.0, 0.4, 0.1}, {1.0, 0.0, 0.5}};
+  const Placement placement = place_vertex(ring, line.point, line, 1e-6);
+  EXPECT_LT(glm::length(glm::cross(placement.position - line.point, line.direction)), 1e-9);
+}
+
+TEST(VertexPlacement, RestoresTheAreaOfCurvedRingsAndKeepsPlanesPlane) {
+  const CollapseRing plane = grid_ring([](double x, double y) { return x + 3 * y; });
+  const dvec3 x(0.5, 0.1, 0.8);
+  EXPECT_LT(glm::length(restore_area(plane, x) - x), 1e-9);
+  for (const double curvature : {-0.3, -0.05, 0.05, 0.3}) {
+    const CollapseRing bowl = grid_ring([=](double px, double py) { return curvature * (squared({px - 0.5, py, 0})); });
+    const dvec3 optimum = place_vertex(bowl, {0.5, 0.0, 0.0}, std::nullopt, 1e-6).position;
+    const double before = area_before(bowl);
+    const double error = std::abs(area_after(bowl, optimum) - before);
+    const double restored = std::abs(area_after(bowl, restore_area(bowl, optimum)) - before);
+    EXPECT_LE(restored, error + 1e-12);
+    EXPECT_LT(restored, 0.002 * before);
+  }
+}
+
+TEST(VertexPlacement, AFoldedSheetStaysWhereItIs) {
+  // Two coincident layers: the enclosed volume hardly depends on x.
+  CollapseRing ring = grid_ring([](double, double) { return 0.0; });
+  const CollapseRing front = ring;
+  for (const auto& [a, b, c] : front.before) ring.before.push_back({a, c, b});
+  for (const auto& [q, s] : front.after) ring.after.push_back({s, q});
+  const dvec3 x(0.5, 0.0, 0.05);
+  EXPECT_LT(glm::length(restore_area(ring, x) - x), 1e-6);
+}
+
+TEST(VertexPlacement, ABorderEnclosesTheSameArea) {
+  std::mt19937 rng(3);
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  const auto cross2 = [](const dvec3& a, const dvec3& b) { return a.x * b.y - a.y * b.x; };
+  for (int round = 0; round < 200; ++round) {
+    const dvec3 p(0), a(u(rng), u(rng), 0), b(u(rng), u(rng), 0), q(u(rng), u(rng), 0);
+    const auto line = area_preserving_line(p, a, b, q);
+    if (!line) continue;
+    const dvec3 x = line->point + u(rng) * line->direction;
+    EXPECT_NEAR(cross2(x, q), cross2(a, b) + cross2(b, q), 1e-9);
+  }
+  EXPECT_FALSE(area_preserving_line({0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 0, 0}));
+}
+
+}  // namespace
+}  // namespace farfield
