@@ -74,6 +74,14 @@ struct LevelHeader {
   vec3 volume_origin{0.0f};  ///< lower corner of brick (0,0,0); voxel size is `resolution`
 };
 
+/// Coordinates, in bricks, of an entry of the brick table.
+inline ivec3 brick_coordinates(const LevelHeader& header, uint64_t table_index) {
+  const auto x = static_cast<uint64_t>(header.brick_dims.x);
+  const auto y = static_cast<uint64_t>(header.brick_dims.y);
+  return {static_cast<int>(table_index % x), static_cast<int>(table_index / x % y),
+          static_cast<int>(table_index / (x * y))};
+}
+
 /// The arrays, owned (Array = std::vector<T>) while baking, or as spans into a mapped file at run time.
 template <template <typename> class Array>
 struct LevelArrays {

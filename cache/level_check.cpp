@@ -228,11 +228,7 @@ Problem check_voxels_inside(const LevelView& level) {
     if (level.brick_table[i] == kNoBrick) continue;
     const Box3 active = active_box(level.bricks[level.brick_table[i]]);
     if (active.is_empty()) continue;
-    const uint64_t dims_x = static_cast<uint64_t>(header.brick_dims.x);
-    const uint64_t dims_y = static_cast<uint64_t>(header.brick_dims.y);
-    const vec3 brick(static_cast<float>(i % dims_x), static_cast<float>(i / dims_x % dims_y),
-                     static_cast<float>(i / (dims_x * dims_y)));
-    const vec3 corner = brick * static_cast<float>(kBrickSide);
+    const vec3 corner(brick_coordinates(header, i) * kBrickSide);
     const vec3 lower = header.volume_origin + (corner + active.lower) * header.resolution;
     const vec3 upper = header.volume_origin + (corner + active.upper) * header.resolution;
     if (!contains(allowed, lower) || !contains(allowed, upper)) {

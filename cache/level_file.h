@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <span>
 
 #include "base/result.h"
 #include "cache/level.h"
@@ -41,6 +42,8 @@ class LevelFile {
 
   const LevelView& view() const { return view_; }
   uint64_t file_bytes() const { return map_bytes_; }
+  /// The whole file, for hashing.
+  std::span<const std::byte> bytes() const { return {map_, map_bytes_}; }
   /// Bytes of the whole pages that hold only positions and quads, which only a BVH build reads, and morph maps, which
   /// rays that dissolve between levels do not read.
   uint64_t build_only_bytes() const;

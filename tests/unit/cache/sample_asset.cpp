@@ -243,6 +243,41 @@ Manifest sample_manifest() {
   return manifest;
 }
 
+Manifest write_sample_asset(const std::filesystem::path& folder) {
+  Manifest manifest = sample_manifest();
+  manifest.bounds = Box3{};
+  manifest.hull.clear();
+  LevelData finer;
+  for (LevelEntry& entry : manifest.levels) {
+    LevelData level = random_level(entry.level + 1, 50u >> entry.level, entry.level);
+    level.header.level = entry.level;
+    level.header.resolution = static_cast<float>(entry.resolution);
+    level.header.bounds = Box3{};
+    level.header.volume_origin = vec3(0.0f);
+    fill_box_bounds(level.header);
+    for (const vec3& position : level.positions) level.header.bounds.extend(position);
+    level.morph_vertex.assign(finer.positions.size(), 0);
+    level.morph_face.assign(face_count(view_of(finer)), kMorphCollapsed);
+    manifest.bounds.extend(level.header.bounds);
+
+    const auto path = folder / entry.file;
+    entry.file_bytes = *write_level(path, level);
+    entry.file_hash = hash_bytes(read_bytes(path));
+    entry.triangles = face_count(view_of(level));
+    entry.voxels = voxel_count(view_of(level));
+    entry.bricks = level.bricks.size();
+    entry.resident_bytes = entry.file_bytes + 1000;
+    finer = std::move(level);
+  }
+  const vec3 corners[] = {manifest.bounds.lower, manifest.bounds.upper};
+  for (size_t i = 0; i < 8; ++i) {
+    manifest.hull.emplace_back(corners[i & 1].x, corners[i >> 1 & 1].y, corners[i >> 2].z);
+  }
+  const Result<void> written = write_manifest(folder, manifest);
+  if (!written) std::abort();
+  return manifest;
+}
+
 TemporaryFolder::TemporaryFolder() {
   static std::atomic<int> counter{0};
   path_ = std::filesystem::temp_directory_path() /

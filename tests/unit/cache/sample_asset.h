@@ -40,6 +40,9 @@ uint64_t walk(const LevelView& level);
 /// A manifest of three levels (0, 1 and 3).
 Manifest sample_manifest();
 
+/// Writes a sound asset of three levels (0, 1 and 3) with surfaces, volumes and morph maps. Returns its manifest.
+Manifest write_sample_asset(const std::filesystem::path& folder);
+
 /// A folder under the system's temporary one, removed with all that is in it.
 class TemporaryFolder {
  public:

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cache/verify.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <set>
+
+#include "base/hash.h"
+#include "cache/level_file.h"
+#include "cache/level_format.h"
+#include "cache/manifest.h"
+
+namespace farfield {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// What the next coarser level's morph map must fit.
+struct FinerLevel {
+  uint64_t vertices = 0;
+  uint64_t faces = 0;
+};
+
+class Verifier {
+ public:
+  explicit Verifier(const fs::path& folder) : folder_(folder) {}
+
+  VerifyResult run() {
+    const Result<Manifest> manifest = read_manifest(folder_);
+    if (!manifest) {
+      file_ = kManifestName;
+      error(manifest.error().message);
+      return result_;
+    }
+    manifest_ = &*manifest;
+    std::optional<FinerLevel> finer;
+    for (const LevelEntry& entry : manifest->levels) {
+      finer = check_level(entry, finer, entry.level == manifest->levels.front().level);
+    }
+    check_folder();
+    return result_;
+  }
+
+ private:
+  void add(Finding::Severity severity, std::string message) {
+    result_.findings.push_back({severity, file_, std::move(message)});
+  }
+  void error(std::string message) { add(Finding::Severity::Error, std::move(message)); }
+  /// A figure of the manifest that the file contradicts.
+  void mismatch(const char* what, const std::string& manifest_says, const std::string& file_says) {
+    error(fmt::format("{}: {} is {} in the manifest and {} in the file; bake the asset again", file_, what,
+                      manifest_says, file_says));
+  }
+  void expect_count(const char* what, uint64_t manifest_says, uint64_t file_says) {
+    if (manifest_says != file_says) mismatch(what, fmt::to_string(manifest_says), fmt::to_string(file_says));
+  }
+
+  std::optional<FinerLevel> check_level(const LevelEntry& entry, const std::optional<FinerLevel>& finer,
+                                        bool is_first) {
+    file_ = entry.file;
+    const auto opened = LevelFile::open(folder_ / entry.file, LevelCheck::Full);
+    if (!opened) {
+      error(opened.error().message);
+      return {};
+    }
+    const LevelFile& file = **opened;
+    const LevelView& level = file.view();
+    ++result_.levels_checked;
+    result_.bytes_checked += file.file_bytes();
+
+    expect_count("the file's size", entry.file_bytes, file.file_bytes());
+    const uint64_t hash = hash_bytes(file.bytes());
+    if (entry.file_hash != hash) mismatch("the file's hash", to_hex(entry.file_hash), to_hex(hash));
+    expect_count("the number of triangles", entry.triangles, face_count(level));
+    expect_count("the number of voxels", entry.voxels, voxel_count(level));
+    expect_count("the number of bricks", entry.bricks, level.bricks.size());
+    expect_count("the level's number", entry.level, level.header.level);
+    check_resolution(entry, level);
+    check_resident_bytes(entry, level);
+    check_bounds(level);
+    check_hull(level);
+    check_morph(level, finer, is_first);
+    return FinerLevel{level.positions.size(), face_count(level)};
+  }
+
+  /// r_k = 2^k r_0, the same in manifest and file. Files store floats.
+  void check_resolution(const LevelEntry& entry, const LevelView& level) {
+    constexpr double kFloatRounding = 1e-5;
+    const auto differ = [&](double a, double b) { return std::abs(a - b) > kFloatRounding * std::abs(b); };
+    const double in_file = static_cast<double>(level.header.resolution);
+    if (differ(in_file, entry.resolution)) {
+      mismatch("the resolution", fmt::to_string(entry.resolution), fmt::to_string(in_file));
+    }
+    const double expected = std::ldexp(manifest_->base_resolution, static_cast<int>(entry.level));
+    if (differ(entry.resolution, expected)) {
+      error(fmt::format("{}: level {} has resolution {}, expected {} (2^{} of the finest); bake the asset again", file_,
+                        entry.level, entry.resolution, expected, entry.level));
+    }
+  }
+
+  /// The planner trusts this figure: at least the sections that rays read must be in it.
+  void check_resident_bytes(const LevelEntry& entry, const LevelView& level) {
+    uint64_t least = 0;
+    for_each_section(level, [&](SectionId id, const auto& array) {
+      if (id != SectionId::Positions && id != SectionId::Quads) least += array.size_bytes();
+    });
+    if (entry.resident_bytes >= least) return;
+    error(fmt::format("{}: the manifest counts {} resident bytes, and its arrays alone have {}; bake the asset again",
+                      file_, entry.resident_bytes, least));
+  }
+
+  void check_bounds(const LevelView& level) {
+    const Box3& all = manifest_->bounds;
+    const Box3& own = level.header.bounds;
+    const vec3 slack(1e-5f * max_component(all.size()));
+    const bool inside = glm::all(glm::greaterThanEqual(own.lower, all.lower - slack)) &&
+                        glm::all(glm::lessThanEqual(own.upper, all.upper + slack));
+    if (!inside) error(fmt::format("{}: it reaches out of the manifest's bounds; bake the asset again", file_));
+  }
+
+  /// Instances are bounded by the hull: what lies outside of it is cut off. Tested along directions all around, which
+  /// finds anything that sticks out visibly.
+  void check_hull(const LevelView& level) {
+    if (manifest_->hull.empty()) return;  // then the bounds serve
+    constexpr int kDirections = 64;
+    const float slack = 1e-4f * glm::length(manifest_->bounds.size());
+    std::vector<vec3> points = voxel_centers(level);
+    points.insert(points.end(), level.positions.begin(), level.positions.end());
+    for (int i = 0; i < kDirections; ++i) {
+      const vec3 direction = fibonacci_direction(i, kDirections);
+      const float reach = reach_along(direction, points);
+      const float hull_reach = reach_along(direction, manifest_->hull);
+      if (reach <= hull_reach + slack) continue;
+      error(
+          fmt::format("{}: it reaches {} out of the manifest's hull; bake the asset again", file_, reach - hull_reach));
+      return;
+    }
+  }
+
+  static std::vector<vec3> voxel_centers(const LevelView& level) {
+    std::vector<vec3> centers;
+    for (size_t cell = 0; cell < level.brick_table.size(); ++cell) {
+      if (level.brick_table[cell] == kNoBrick) continue;
+      const ivec3 corner = brick_coordinates(level.header, cell) * kBrickSide;
+      const Brick& brick = level.bricks[level.brick_table[cell]];
+      for (int i = 0; i < kBrickVoxels; ++i) {
+        if (brick.density[static_cast<size_t>(i)] == 0) continue;
+        const ivec3 voxel = corner + ivec3(i % 8, i / 8 % 8, i / 64);
+        centers.push_back(level.header.volume_origin + (vec3(voxel) + 0.5f) * level.header.resolution);
+      }
+    }
+    return centers;
+  }
+
+  static vec3 fibonacci_direction(int i, int count) {
+    const float z = 1.0f - (2.0f * static_cast<float>(i) + 1.0f) / static_cast<float>(count);
+    const float phi = 2.39996323f * static_cast<float>(i);  // the golden angle
+    const float radius = std::sqrt(1.0f - z * z);
+    return {radius * std::cos(phi), radius * std::sin(phi), z};
+  }
+
+  static float reach_along(const vec3& direction, std::span<const vec3> points) {
+    float reach = -std::numeric_limits<float>::infinity();
+    for (const vec3& point : points) reach = std::max(reach, glm::dot(direction, point));
+    return reach;
+  }
+
+  /// A morph map has an entry for each vertex and face of the next finer stored level, or is absent.
+  void check_morph(const LevelView& level, const std::optional<FinerLevel>& finer, bool is_first) {
+    const bool has_morph = !level.morph_vertex.empty() || !level.morph_face.empty();
+    if (!has_morph) return;
+    if (is_first) return error(fmt::format("{}: the finest level has a morph map; bake the asset again", file_));
+    if (!finer) return;  // that level could not be read, which is a finding already
+    expect_morph("vertices", level.morph_vertex.size(), finer->vertices);
+    expect_morph("faces", level.morph_face.size(), finer->faces);
+  }
+  void expect_morph(const char* what, uint64_t mapped, uint64_t expected) {
+    if (mapped == expected) return;
+    error(fmt::format("{}: its morph map has {} {}, and the next finer level has {}; bake the asset again", file_,
+                      mapped, what, expected));
+  }
+
+  /// Files that do not belong: left by an interrupted bake, or put there by someone.
+  void check_folder() {
+    std::set<std::string> known = {kManifestName};
+    for (const LevelEntry& entry : manifest_->levels) known.insert(entry.file);
+    std::set<std::string> strangers;  // sorted: the order of a folder is not
+    std::error_code failure;
+    for (fs::directory_iterator entry(folder_, failure), end; !failure && entry != end; entry.increment(failure)) {
+      const std::string name = entry->path().filename().string();
+      if (!known.contains(name)) strangers.insert(name);
+    }
+    for (const std::string& name : strangers) {
+      file_ = name;
+      add(Finding::Severity::Warning, fmt::format("{}: it is not part of the asset; you may remove it", name));
+    }
+  }
+
+  const fs::path& folder_;
+  const Manifest* manifest_ = nullptr;
+  std::string file_;  ///< what is being checked
+  VerifyResult result_;
+};
+
+}  // namespace
+
+bool VerifyResult::is_sound() const {
+  return std::ranges::none_of(findings, [](const Finding& f) { return f.severity == Finding::Severity::Error; });
+}
+
+VerifyResult verify_asset(const fs::path& asset_dir) { return Verifier(asset_dir).run(); }
+
+}  // namespace farfield
