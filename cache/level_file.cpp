@@ -36,7 +36,8 @@ struct FileRange {
   uint64_t end = 0;
 };
 
-bool is_load_only(SectionId id) {
+bool is_build_only(const SectionEntry& section) {
+  const auto id = static_cast<SectionId>(section.id);
   return id == SectionId::Positions || id == SectionId::Quads || id == SectionId::MorphVertex ||
          id == SectionId::MorphFace;
 }
@@ -45,17 +46,13 @@ bool is_load_only(SectionId id) {
 /// maps at its end.
 std::vector<FileRange> build_only_pages(const LevelLayout& layout) {
   std::vector<FileRange> ranges;
-  bool extend_last = false;
-  for (const SectionEntry& section : layout.sections) {
-    const bool load_only = is_load_only(static_cast<SectionId>(section.id));
-    if (load_only && !extend_last) ranges.push_back({section.offset, 0});
-    if (load_only) ranges.back().end = section.offset + section.bytes;
-    extend_last = load_only;
-  }
-  for (FileRange& range : ranges) {
-    const uint64_t mapped_end = (layout.file_bytes + kPageBytes - 1) / kPageBytes * kPageBytes;
-    range.begin = (range.begin + kPageBytes - 1) / kPageBytes * kPageBytes;
-    range.end = range.end == layout.file_bytes ? mapped_end : range.end / kPageBytes * kPageBytes;
+  for (size_t i = 0; i < layout.sections.size(); ++i) {
+    if (!is_build_only(layout.sections[i])) continue;
+    const bool continues = i > 0 && is_build_only(layout.sections[i - 1]);
+    if (!continues) ranges.push_back({round_up(layout.sections[i].offset, kPageBytes), 0});
+    const bool is_last = i + 1 == layout.sections.size();
+    ranges.back().end =
+        is_last ? round_up(layout.file_bytes, kPageBytes) : layout.sections[i + 1].offset / kPageBytes * kPageBytes;
   }
   std::erase_if(ranges, [](const FileRange& range) { return range.begin >= range.end; });
   return ranges;
@@ -94,7 +91,7 @@ LevelFileSizes level_file_sizes(const LevelView& level) {
   const LevelLayout layout = layout_of(level);
   uint64_t build_only = 0;
   for (const FileRange& range : build_only_pages(layout)) build_only += range.end - range.begin;
-  return {layout.file_bytes, (layout.file_bytes + kPageBytes - 1) / kPageBytes * kPageBytes, build_only};
+  return {layout.file_bytes, round_up(layout.file_bytes, kPageBytes), build_only};
 }
 
 Result<std::unique_ptr<LevelFile>> LevelFile::open(const std::filesystem::path& path, LevelCheck check) {

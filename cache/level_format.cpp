@@ -20,8 +20,6 @@ using Bytes = std::span<const std::byte>;
 
 constexpr uint64_t kHeaderBytes = sizeof(FileHeader);
 
-uint64_t round_up(uint64_t value, uint64_t alignment) { return (value + alignment - 1) / alignment * alignment; }
-
 /// Where a section's claim on the file ends.
 uint64_t end_of(const SectionEntry& section) {
   const bool padded = section.id == static_cast<uint32_t>(SectionId::Positions);

@@ -31,9 +31,13 @@ inline constexpr uint64_t kSectionAlignment = 64;  ///< a cache line; Brick need
 inline constexpr uint64_t kPositionsPadding = 16;  ///< Embree reads 16 bytes at the last position
 inline constexpr uint64_t kPageBytes = 4096;       ///< the granularity in which mapped bytes become resident
 
+inline uint64_t round_up(uint64_t value, uint64_t multiple_of) {
+  return (value + multiple_of - 1) / multiple_of * multiple_of;
+}
+
 /// Arrays of a level, in the order in which they lie in the file. Ids never change their meaning.
 enum class SectionId : uint32_t {
-  Positions = 1,  // the first two are only read by BVH builds: together they can be given back
+  Positions = 1,  // the first two are only read by BVH builds, the last two only by morphs: ends that can be given back
   Quads = 2,
   QuadFirstFace = 3,
   FaceSggx = 4,

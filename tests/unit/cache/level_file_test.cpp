@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <array>
+#include <cmath>
 #include <cstring>
 #include <functional>
 
@@ -63,9 +65,13 @@ TEST(LevelFile, GivesBackWhatWasWritten) {
 }
 
 TEST(LevelFile, BytesDependOnlyOnTheLevel) {
-  const LevelData level = test::random_level(5, 100, 10);
-  FileImage first(level), second(level);
-  EXPECT_TRUE(std::ranges::equal(first.bytes(), second.bytes()));
+  const TemporaryFolder folder;
+  for (uint64_t seed = 1; seed < 10; ++seed) {
+    const LevelData level = test::random_level(seed, 100, 10);
+    ASSERT_TRUE(write_level(folder.path() / "a", level));
+    FileImage image(view_of(level));
+    EXPECT_TRUE(std::ranges::equal(test::read_bytes(folder.path() / "a"), image.bytes()));
+  }
 }
 
 TEST(LevelFile, SizesAreKnownBeforeWriting) {
@@ -106,6 +112,301 @@ TEST(LevelFile, ReleasedBuildPagesComeBackUnchanged) {
   const uint64_t before = test::walk((*file)->view());
   (*file)->release_build_pages();
   EXPECT_EQ(test::walk((*file)->view()), before);
+}
+
+// ---- the format ----
+
+TEST(LevelFormat, GoldenBytesOfVersion1AreFrozen) {
+  // Made by this test's first version. If it fails, the format has changed: give it a new version, keep reading this
+  // one.
+  const std::vector<std::byte> golden = test::read_bytes(FARFIELD_TEST_DATA "/format_v1/level_3.ffl");
+  ASSERT_EQ(golden.size(), 3264u);
+  FileImage written(view_of(full_level()));
+  EXPECT_TRUE(std::ranges::equal(golden, written.bytes()));
+
+  FileImage image(golden);
+  const Result<LevelView> view = parse_level(image.bytes(), LevelCheck::Full, "golden");
+  ASSERT_TRUE(view) << view.error().message;
+  expect_same(*view, view_of(full_level()));
+}
+
+TEST(LevelFormat, EverySectionStartsAtTheNextCacheLine) {
+  for (uint64_t seed = 0; seed < 50; ++seed) {
+    const LevelData level = seed == 0 ? full_level() : test::random_level(seed, 20, 3);
+    const LevelLayout layout = layout_of(view_of(level));
+    uint64_t end = 128 + 40 * layout.sections.size();
+    for (const SectionEntry& section : layout.sections) {
+      EXPECT_EQ(section.offset % 64, 0u);
+      EXPECT_GE(section.offset, end);
+      EXPECT_LT(section.offset, end + 64);
+      end = section.offset + section.bytes;
+      if (section.id == static_cast<uint32_t>(SectionId::Positions)) end += 16;
+    }
+    EXPECT_EQ(layout.file_bytes, (end + 63) / 64 * 64);
+  }
+}
+
+// ---- hostile bytes ----
+
+constexpr LevelCheck kBothChecks[] = {LevelCheck::Structure, LevelCheck::Full};
+
+Result<LevelView> parse(FileImage& image, LevelCheck check = LevelCheck::Structure) {
+  return parse_level(image.bytes(), check, "test.ffl");
+}
+
+void expect_refused(FileImage& image, ErrorCode code, const std::string& words, LevelCheck check) {
+  const Result<LevelView> view = parse(image, check);
+  ASSERT_FALSE(view) << "expected: " << words;
+  EXPECT_EQ(view.error().code, code) << view.error().message;
+  EXPECT_NE(view.error().message.find(words), std::string::npos) << view.error().message << "\nexpected: " << words;
+  EXPECT_NE(view.error().message.find("test.ffl"), std::string::npos);
+  EXPECT_EQ(view.error().message.find('\n'), std::string::npos);
+}
+
+TEST(HostileLevelFile, EveryTruncationIsRefused) {
+  FileImage whole(view_of(full_level()));
+  for (size_t size = 0; size < whole.bytes().size(); ++size) {
+    FileImage part(whole.bytes().first(size));
+    for (const LevelCheck check : kBothChecks) {
+      const Result<LevelView> view = parse(part, check);
+      ASSERT_FALSE(view) << size;
+      ASSERT_EQ(view.error().code, ErrorCode::BadFile);
+    }
+  }
+}
+
+TEST(HostileLevelFile, EveryTruncationIsRefusedEvenIfTheHeaderAgrees) {
+  FileImage whole(view_of(full_level()));
+  for (size_t size = 0; size < whole.bytes().size(); ++size) {
+    FileImage part(whole.bytes().first(size));
+    if (size >= sizeof(FileHeader)) {
+      const uint64_t file_bytes = size;
+      std::memcpy(part.bytes().data() + offsetof(FileHeader, file_bytes), &file_bytes, sizeof file_bytes);
+      seal_head(part.bytes());
+    }
+    ASSERT_FALSE(parse(part)) << size;
+  }
+}
+
+TEST(HostileLevelFile, TrailingBytesAreRefused) {
+  FileImage whole(view_of(full_level()));
+  std::vector<std::byte> longer(whole.bytes().begin(), whole.bytes().end());
+  longer.resize(longer.size() + 64);
+  FileImage image(longer);
+  expect_refused(image, ErrorCode::BadFile, "the header says 3264 bytes, and the file has 3328", LevelCheck::Structure);
+}
+
+TEST(HostileLevelFile, FullCheckFindsEveryFlippedBit) {
+  FileImage image(view_of(full_level()));
+  for (size_t i = 0; i < image.bytes().size(); ++i) {
+    for (int bit = 0; bit < 8; ++bit) {
+      image.bytes()[i] ^= std::byte{1} << bit;
+      ASSERT_FALSE(parse(image, LevelCheck::Full)) << "byte " << i << " bit " << bit;
+      image.bytes()[i] ^= std::byte{1} << bit;
+    }
+  }
+  EXPECT_TRUE(parse(image, LevelCheck::Full));
+}
+
+TEST(HostileLevelFile, WhatTheStructureCheckAcceptsNeverLeavesTheFile) {
+  // Damage of one to four bytes, the head's checksum made to agree. What still parses is read in full (run under ASan).
+  Rng rng(11);
+  int accepted = 0;
+  for (int trial = 0; trial < 60000; ++trial) {
+    static const LevelData levels[] = {full_level(), test::random_level(3, 12, 0), test::random_level(4, 0, 2),
+                                       test::random_level(5, 7, 1)};
+    static std::array<FileImage, 4> images = {FileImage(view_of(levels[0])), FileImage(view_of(levels[1])),
+                                              FileImage(view_of(levels[2])), FileImage(view_of(levels[3]))};
+    FileImage image = images[rng.next_uint() % 4];
+    const bool in_head = rng.next_uint() % 2 == 0;
+    const size_t range = in_head ? std::min<size_t>(128 + 40 * 18, image.bytes().size()) : image.bytes().size();
+    for (uint32_t change = 0; change <= rng.next_uint() % 4; ++change) {
+      const std::byte values[] = {std::byte{0}, std::byte{1}, std::byte{0xff}, static_cast<std::byte>(rng.next_uint())};
+      image.bytes()[rng.next_uint() % range] = values[rng.next_uint() % 4];
+    }
+    seal_head(image.bytes());
+    if (const Result<LevelView> view = parse(image)) {
+      ++accepted;
+      test::walk(*view);
+    }
+  }
+  EXPECT_GT(accepted, 1000);  // damage of payloads is not the structure's business
+}
+
+TEST(HostileLevelFile, HeaderAndTableFieldsAreChecked) {
+  struct Case {
+    std::string words;
+    std::function<void(FileHeader&, SectionEntry*)> change;
+    ErrorCode code = ErrorCode::BadFile;
+  };
+  constexpr uint64_t kHuge = ~uint64_t{0};
+  const std::vector<Case> cases = {
+      {"does not start as a level file", [](auto& h, auto*) { h.magic[1] = 'X'; }},
+      {"the format version is 0", [](auto& h, auto*) { h.version = 0; }},
+      {"level format 2, and this Farfield reads up to 1", [](auto& h, auto*) { h.version = 2; },
+       ErrorCode::Unsupported},
+      {"the header says", [](auto& h, auto*) { h.file_bytes = kHuge; }},
+      {"sections leaves the file", [](auto& h, auto*) { h.section_count = 0xffffffffu; }},
+      {"reserved bytes", [](auto& h, auto*) { h.reserved[39] = 1; }},
+      {"the resolution is 0", [](auto& h, auto*) { h.resolution = 0; }},
+      {"the resolution is nan", [](auto& h, auto*) { h.resolution = NAN; }},
+      {"the resolution is inf", [](auto& h, auto*) { h.resolution = INFINITY; }},
+      {"bounds are empty", [](auto& h, auto*) { h.bounds_lower[1] = 1e9f; }},
+      {"bounds are empty or not finite", [](auto& h, auto*) { h.bounds_upper[2] = NAN; }},
+      {"origin is not finite", [](auto& h, auto*) { h.volume_origin[0] = -INFINITY; }},
+      {"brick_dims are -2 x 1 x 1", [](auto& h, auto*) { h.brick_dims[0] = -2; }},
+      {"brick_dims are 2147483647 x", [](auto& h, auto*) { h.brick_dims[0] = 0x7fffffff; }},
+      {"brick_dims are 2 x 0 x 1", [](auto& h, auto*) { h.brick_dims[1] = 0; }},
+      {"brick_table has 2 elements for 2 x 1 x 2", [](auto& h, auto*) { h.brick_dims[2] = 2; }},
+      {"section id 99 is unknown", [](auto&, auto* t) { t[3].id = 99; }},
+      {"section id 1 is unknown, repeated or out of order", [](auto&, auto* t) { t[1].id = 1; }},
+      {"section id 4 is unknown, repeated or out of order", [](auto&, auto* t) { t[2].id = 18; }},
+      {"section quads has elements of 12 bytes, expected 16", [](auto&, auto* t) { t[1].element_bytes = 12; }},
+      {"section positions has 0 elements", [](auto&, auto* t) { t[0].count = 0; }},
+      {"section positions has 18446744073709551615 elements", [](auto&, auto* t) { t[0].count = kHuge; }},
+      // 4 + 2^62 elements of 12 bytes are 48 bytes modulo 2^64
+      {"elements in a file of", [](auto&, auto* t) { t[0].count = 4 + (uint64_t{1} << 62); }},
+      {"section positions has 49 bytes, expected 48", [](auto&, auto* t) { t[0].bytes = 49; }},
+      {"section quads lies at byte 1, expected 960", [](auto&, auto* t) { t[1].offset = 1; }},
+      {"section quads lies at byte 18446744073709551552", [](auto&, auto* t) { t[1].offset = kHuge - 63; }},
+      {"leaves the file",
+       [](auto&, auto* t) {
+         t[17].count = 100;
+         t[17].bytes = 400;
+       }},
+  };
+  for (const Case& test_case : cases) {
+    FileImage image(view_of(full_level()));
+    auto* header = reinterpret_cast<FileHeader*>(image.bytes().data());
+    auto* table = reinterpret_cast<SectionEntry*>(image.bytes().data() + sizeof(FileHeader));
+    test_case.change(*header, table);
+    seal_head(image.bytes());
+    expect_refused(image, test_case.code, test_case.words, LevelCheck::Structure);
+  }
+}
+
+TEST(HostileLevelFile, BytesThatNoSectionClaimsAreRefused) {
+  LevelData level = full_level();
+  level.morph_face.assign(40, 0);
+  FileImage image(view_of(level));
+  auto* table = reinterpret_cast<SectionEntry*>(image.bytes().data() + sizeof(FileHeader));
+  table[17].count = 1;
+  table[17].bytes = 4;
+  seal_head(image.bytes());
+  expect_refused(image, ErrorCode::BadFile, "its sections end at byte", LevelCheck::Structure);
+}
+
+struct LevelCase {
+  std::string words;
+  std::function<void(LevelData&)> change;
+};
+
+TEST(HostileLevelFile, StructureCheckFindsEveryIndexThatLeavesItsArray) {
+  const std::vector<LevelCase> cases = {
+      {"quads[1] = (0, 4, 3, 3), and there are 4 vertices", [](auto& l) { l.quads[1].v1 = 4; }},
+      {"quads[0] =", [](auto& l) { l.quads[0].v0 = 0xffffffffu; }},
+      {"quads[0] =", [](auto& l) { l.positions.clear(); }},
+      {"quad_first_face[0] is 1, expected 0", [](auto& l) { l.quad_first_face[0] = 1; }},
+      {"quad_first_face[1] is 1, expected 2", [](auto& l) { l.quad_first_face[1] = 1; }},
+      {"quad_first_face has 3 elements for 2 quads", [](auto& l) { l.quad_first_face.push_back(3); }},
+      {"face_sggx has 2 elements for 3 faces", [](auto& l) { l.face_sggx.pop_back(); }},
+      {"face_diffuse has 4 elements", [](auto& l) { l.face_diffuse.push_back({}); }},
+      {"face_specular has 4 elements", [](auto& l) { l.face_specular.push_back({}), l.face_roughness2.push_back(1); }},
+      {"face_transmission has 2 elements", [](auto& l) { l.face_transmission.pop_back(); }},
+      {"face_specular and face_roughness2", [](auto& l) { l.face_roughness2.clear(); }},
+      {"brick_table[1] is 5, expected 1 of 2", [](auto& l) { l.brick_table[1] = 5; }},
+      {"brick_table[0] is 1, expected 0", [](auto& l) { std::swap(l.brick_table[0], l.brick_table[1]); }},
+      {"brick_table[1] is 0, expected 1", [](auto& l) { l.brick_table[1] = 0; }},
+      {"brick_table names 1 of 2 bricks", [](auto& l) { l.brick_table[1] = kNoBrick; }},
+      {"brick_dims are 2 x 1 x 1 with 0 bricks", [](auto& l) { l.bricks.clear(); }},
+      {"bricks[0] has density scale 0", [](auto& l) { l.bricks[0].density_scale = 0; }},
+      {"bricks[1] has density scale nan", [](auto& l) { l.bricks[1].density_scale = NAN; }},
+      {"bricks[1] has payload base 4, expected 3", [](auto& l) { l.bricks[1].payload_base = 4; }},
+      {"bricks[1]: mask and densities differ", [](auto& l) { l.bricks[1].mask[7] |= uint64_t{1} << 63; }},
+      {"bricks[1]: mask and densities differ", [](auto& l) { l.bricks[1].density[511] = 1; }},
+      {"bricks[0] has prefix sum 65535, expected 2", [](auto& l) { l.bricks[0].prefix[3] = 0xffff; }},
+      {"voxel_sggx has 6 elements for 5 voxels", [](auto& l) { l.voxel_sggx.push_back({}); }},
+      {"voxel_diffuse has 4 elements", [](auto& l) { l.voxel_diffuse.pop_back(); }},
+      {"voxel_specular and voxel_roughness2", [](auto& l) { l.voxel_specular.clear(); }},
+      {"voxel_transmission has 4 elements", [](auto& l) { l.voxel_transmission.pop_back(); }},
+      {"voxel_self_shadowing has 6 elements", [](auto& l) { l.voxel_self_shadowing.push_back(1); }},
+      {"morph_vertex[0] is 4, and there are 4", [](auto& l) { l.morph_vertex[0] = 4; }},
+      {"morph_vertex[2] is 4294967294", [](auto& l) { l.morph_vertex[2] = kMorphCollapsed; }},
+      {"morph_face[4] is 3, and there are 3", [](auto& l) { l.morph_face[4] = 3; }},
+      {"neither surface nor volume",
+       [](auto& l) {
+         const LevelHeader header = l.header;
+         l = LevelData();
+         l.header = header;
+         l.header.brick_dims = {0, 0, 0};
+       }},
+  };
+  const TemporaryFolder folder;
+  for (const LevelCase& test_case : cases) {
+    LevelData level = full_level();
+    test_case.change(level);
+    FileImage image(view_of(level));
+    expect_refused(image, ErrorCode::BadFile, test_case.words, LevelCheck::Structure);
+    const Result<uint64_t> written = write_level(folder.path() / "a.ffl", level);
+    ASSERT_FALSE(written) << test_case.words;
+    EXPECT_EQ(written.error().code, ErrorCode::InvalidArgument);
+    EXPECT_NE(written.error().message.find(test_case.words), std::string::npos) << written.error().message;
+  }
+  EXPECT_TRUE(folder.names().empty());
+}
+
+TEST(HostileLevelFile, FullCheckFindsValuesThatMakeNoSense) {
+  const std::vector<LevelCase> cases = {
+      {"positions[2] = (nan,", [](auto& l) { l.positions[2].x = NAN; }},
+      {"positions[3] = (", [](auto& l) { l.positions[3].z = INFINITY; }},
+      {"positions[1] = (10", [](auto& l) { l.positions[1].x = 10.0f; }},
+      {"bricks[0] has voxels outside the bounds", [](auto& l) { l.header.volume_origin.x += 2.5f; }},
+      {"bricks[0]: reserved bytes", [](auto& l) { l.bricks[0].reserved[7] = 1; }},
+      {"voxel_self_shadowing[3] is 0", [](auto& l) { l.voxel_self_shadowing[3] = 0; }},
+  };
+  const TemporaryFolder folder;
+  for (const LevelCase& test_case : cases) {
+    LevelData level = full_level();
+    test_case.change(level);
+    FileImage image(view_of(level));
+    EXPECT_TRUE(parse(image, LevelCheck::Structure)) << test_case.words;
+    expect_refused(image, ErrorCode::BadFile, test_case.words, LevelCheck::Full);
+    EXPECT_FALSE(write_level(folder.path() / "a.ffl", level)) << test_case.words;
+  }
+}
+
+TEST(HostileLevelFile, ChecksumErrorsNameTheSection) {
+  const LevelLayout layout = layout_of(view_of(full_level()));
+  for (const SectionEntry& section : layout.sections) {
+    FileImage image(view_of(full_level()));
+    const auto id = static_cast<SectionId>(section.id);
+    if (id == SectionId::QuadFirstFace || id == SectionId::BrickTable) continue;  // no byte is free to change
+    const size_t harmless = id == SectionId::Bricks ? 88 : 0;
+    auto& byte = image.bytes()[section.offset + harmless];
+    byte = byte == std::byte{2} ? std::byte{1} : std::byte{2};
+    expect_refused(image, ErrorCode::BadFile, fmt::format("checksum of section {} ", section_name(id)),
+                   LevelCheck::Full);
+  }
+}
+
+TEST(LevelFile, AnythingButALevelFileIsAnError) {
+  const TemporaryFolder folder;
+  const auto code_of = [&](const char* name) {
+    const auto file = LevelFile::open(folder.path() / name, LevelCheck::Structure);
+    EXPECT_FALSE(file);
+    EXPECT_NE(file.error().message.find(name), std::string::npos) << file.error().message;
+    return file.error().code;
+  };
+  EXPECT_EQ(code_of("missing"), ErrorCode::NotFound);
+  test::write_text(folder.path() / "empty", "");
+  EXPECT_EQ(code_of("empty"), ErrorCode::BadFile);
+  test::write_text(folder.path() / "text", std::string(5000, 'x'));
+  EXPECT_EQ(code_of("text"), ErrorCode::BadFile);
+  ASSERT_TRUE(write_level(folder.path() / "level", full_level()));
+  std::filesystem::create_symlink(folder.path() / "level", folder.path() / "link");
+  EXPECT_EQ(code_of("link"), ErrorCode::BadFile);
+  std::filesystem::create_directory(folder.path() / "folder");
+  EXPECT_EQ(code_of("folder"), ErrorCode::BadFile);
 }
 
 }  // namespace

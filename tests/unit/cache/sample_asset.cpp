@@ -160,11 +160,18 @@ LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks) {
   return level;
 }
 
-FileImage::FileImage(const LevelData& level) {
-  const TemporaryFolder folder;
-  const auto path = folder.path() / "level.ffl";
-  if (!write_level(path, level)) std::abort();
-  *this = FileImage(read_bytes(path));
+FileImage::FileImage(const LevelView& level) {
+  const LevelLayout layout = layout_of(level);
+  const std::vector<std::byte> head = encode_head(level, layout);
+  storage_.resize(layout.file_bytes / sizeof(Line));
+  size_ = layout.file_bytes;
+  std::memcpy(storage_.data(), head.data(), head.size());
+  size_t next = 0;
+  for_each_section(level, [&](SectionId, const auto& array) {
+    if (array.empty()) return;
+    std::memcpy(bytes().data() + layout.sections[next].offset, array.data(), array.size_bytes());
+    ++next;
+  });
 }
 
 FileImage::FileImage(std::span<const std::byte> bytes) : storage_((bytes.size() + 63) / 64), size_(bytes.size()) {

@@ -18,10 +18,10 @@ LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks);
 /// Fills mask, prefix and payload_base from the densities of all bricks, in order.
 void finish_bricks(std::vector<Brick>& bricks);
 
-/// The bytes that write_level() makes, 64-byte aligned.
+/// The bytes of a level's file, 64-byte aligned. Unlike write_level() this takes any level, sound or not.
 class FileImage {
  public:
-  explicit FileImage(const LevelData& level);
+  explicit FileImage(const LevelView& level);
   explicit FileImage(std::span<const std::byte> bytes);
   std::span<std::byte> bytes() { return {reinterpret_cast<std::byte*>(storage_.data()), size_}; }
 
