@@ -16,10 +16,6 @@ namespace farfield {
 
 namespace {
 
-// Touching one page of a file maps its neighbours too, up to an aligned window of this size (the kernel's
-// fault-around). Where kept and released pages meet, that much may come back.
-constexpr uint64_t kFaultAroundBytes = 64 * 1024;
-
 template <typename T>
 void share_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::span<const T> array) {
   rtcSetSharedGeometryBuffer(geometry, type, 0, format, array.data(), 0, sizeof(T), array.size());
@@ -79,9 +75,10 @@ LevelScene& LevelScene::operator=(LevelScene&& other) noexcept {
 }
 
 LevelCost level_cost(const LevelView& level, const LevelScene& scene) {
+  // Checking the file has mapped all of it. What is not given back stays mapped and so never faults again, which would
+  // bring its neighbours back.
   const LevelFileSizes file = level_file_sizes(level);
-  const uint64_t kept = file.mapped_bytes - file.build_only_bytes + std::min(kFaultAroundBytes, file.build_only_bytes);
-  return {kept + scene.bytes(), file.build_only_bytes + scene.build_peak_bytes()};
+  return {file.mapped_bytes - file.build_only_bytes + scene.bytes(), file.build_only_bytes + scene.build_peak_bytes()};
 }
 
 Result<LevelCost> measure_level_scene(BvhDevice& device, const LevelView& level) {

@@ -13,7 +13,7 @@ inline constexpr uint32_t kNoInstance = 0xffffffffu;
 /// What Farfield remembers of the nearest hit on its geometry, enough to rebuild the interaction. Opaque to hosts.
 struct HitRecord {
   uint32_t instance = kNoInstance;
-  uint32_t element = 0;    ///< face of the surface, or payload index of the voxel
+  uint32_t element = 0;    ///< 2 * quad + side of its diagonal, or payload index of the voxel
   uint8_t level_slot = 0;  ///< index into the asset's stored levels
   bool is_volume = false;
   float lambda = 0;                   ///< continuous level that was asked for
@@ -34,7 +34,7 @@ struct RayContext {
   // In: randomness. Same values give the same answer.
   uint32_t path_seed = 0;  ///< constant along a path: decides which of two blended levels the path sees
   uint32_t ray_seed = 0;   ///< different for every ray: free flights in volumes
-  // In: where the ray starts. A ray that leaves an Farfield hit keeps that hit's level on the same instance.
+  // In: where the ray starts. A ray that leaves a Farfield hit keeps that hit's level on the same instance.
   uint32_t origin_instance = kNoInstance;
   uint8_t origin_level_slot = 0;
 

@@ -92,7 +92,7 @@ struct Stats {
   uint64_t levels_loaded = 0;  ///< loads, reloads included
   uint64_t levels_resident = 0;
   uint64_t levels_released = 0;
-  uint64_t fallbacks = 0;   ///< rays served by a coarser level than planned (progressive mode, broken files)
+  uint64_t fallbacks = 0;  ///< visits of rays to instances that a coarser level served (progressive mode, broken files)
   double load_seconds = 0;  ///< summed over loads: map, check, build
 };
 
@@ -122,14 +122,18 @@ class FARFIELD_API Runtime {
   /// plan_frame(), unless forced_lambda is set.
   void set_cameras(std::vector<TessellationCamera> cameras);
   /// Decides which levels the coming frame may use so that they fit the budget, releases what no longer is allowed.
-  /// The first rays that need a level load it, or prefetch() does. Errors: OutOfBudget, InvalidArgument (no camera).
+  /// Call it after opening assets and adding instances too: until then rays see nothing but roots of new assets. The
+  /// first rays that need a level load it, or prefetch() does. Errors: OutOfBudget (the message has the number that
+  /// would do; the former plan stays), InvalidArgument (no camera).
   Result<PlanSummary> plan_frame();
-  /// Loads what the cameras will certainly need under the current plan, ahead of the rays. Broken levels are reported
-  /// and left out.
+  /// Loads what the cameras will certainly need under the current plan, ahead of the rays; in progressive mode starts
+  /// to, and returns at once. Broken levels are reported and left out.
   void prefetch();
 
   /// Puts the user geometry into the host's scene and returns its geomID; the host commits the scene. Call again after
-  /// adding instances. All instances are primitives of this one geometry: primID is InstanceId::value.
+  /// adding instances. All instances are primitives of this one geometry: primID is InstanceId::value. The scene is
+  /// retained until the next attach() to another one, must not be instanced, and must not be traced or committed once
+  /// the Runtime is gone. Errors: InvalidArgument (no scene), Io (what Embree says).
   Result<unsigned> attach(RTCScene scene);
   unsigned geometry_id() const;
 
