@@ -1,7 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "samples/path_tracer/shot_job.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "samples/path_tracer/image.h"
+#include "tests/unit/cache/sample_asset.h"
+#include "tests/unit/runtime/test_asset.h"
 
 namespace farfield {
 namespace {
@@ -25,6 +34,173 @@ TEST(ParseFrameRange, RefusesTheRest) {
     ASSERT_FALSE(range) << text;
     EXPECT_EQ(range.error().code, ErrorCode::InvalidArgument);
   }
+}
+
+// A scene of two spheres that the camera flies away from, and a script for a baker that copies a prepared asset.
+class Shot : public ::testing::Test {
+ protected:
+  Shot() {
+    testing::write_asset(folder_.path() / "prepared", testing::white_sphere());
+    test::write_text(folder_.path() / "baker",
+                     fmt::format("#!/bin/sh\nrm -rf \"$4\" && cp -r {}/prepared \"$4\"\n", folder_.path().string()));
+    std::filesystem::permissions(folder_.path() / "baker", std::filesystem::perms::owner_all);
+
+    // Buffer: three positions, two times, two translations.
+    const std::vector<float> floats = {-1, -1, -1, 1, 1, 1, -1, 1, 0, 0, 1, 0, 0, 4, 0, 0, 200};
+    test::write_bytes(folder_.path() / "scene.bin", std::as_bytes(std::span(floats)));
+    test::write_text(folder_.path() / "scene.gltf", R"({"asset": {"version": "2.0"},
+"buffers": [{"uri": "scene.bin", "byteLength": 68}],
+"bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 8},
+                {"buffer": 0, "byteOffset": 44, "byteLength": 24}],
+"accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [-1, -1, -1], "max": [1, 1, 1]},
+              {"bufferView": 1, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0], "max": [1]},
+              {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"}],
+"meshes": [{"name": "ball", "primitives": [{"attributes": {"POSITION": 0}}]}],
+"cameras": [{"type": "perspective", "perspective": {"yfov": 0.8, "znear": 0.1}}],
+"nodes": [{"mesh": 0}, {"mesh": 0, "translation": [-3, 0, -2]}, {"camera": 0, "name": "camera"}],
+"animations": [{"samplers": [{"input": 1, "output": 2}],
+                "channels": [{"sampler": 0, "target": {"node": 2, "path": "translation"}}]}],
+"scenes": [{"nodes": [0, 1, 2]}], "scene": 0})");
+    options_.scene = folder_.path() / "scene.gltf";
+    options_.assets = folder_.path() / "assets";
+    options_.baker = folder_.path() / "baker";
+    options_.width = 48;
+    options_.height = 32;
+    options_.trace.samples_per_pixel = 4;
+    options_.budget_bytes = 4 << 20;
+    options_.message = [this](const std::string& line) { messages_ += line + "\n"; };
+  }
+
+  Result<RenderReport> shoot(const FrameRange& frames) { return render_shot(options_, frames, out()); }
+  std::filesystem::path out() const { return folder_.path() / "shot"; }
+  nlohmann::json record() const {
+    const std::vector<std::byte> bytes = test::read_bytes(out() / "shot.json");
+    return nlohmann::json::parse(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+  }
+  std::filesystem::file_time_type time_of(const char* name) const {
+    return std::filesystem::last_write_time(out() / name);
+  }
+
+  test::TemporaryFolder folder_;
+  RenderOptions options_;
+  std::string messages_;
+};
+
+TEST_F(Shot, WritesFramesRecordAndSheet) {
+  const auto report = shoot({0, 24, 12});
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_EQ(messages_, "");
+  for (const char* name : {"frame_0000.exr", "frame_0012.exr", "frame_0024.exr", "frame_0000.png", "frame_0012.png",
+                           "frame_0024.png", "shot.json", "contact_sheet.png"})
+    EXPECT_TRUE(std::filesystem::exists(out() / name)) << name;
+
+  const nlohmann::json json = record();
+  EXPECT_EQ(json["budget_bytes"], 4 << 20);
+  EXPECT_EQ(json["assets"], nlohmann::json({"ball"}));
+  ASSERT_EQ(json["frames"].size(), 3u);
+  for (size_t i = 0; i < 3; ++i) EXPECT_EQ(json["frames"][i]["frame"], 12 * i);
+  EXPECT_LE(json["peak_accounted_bytes"], json["budget_bytes"]);
+  EXPECT_GT(json["frames"][0]["levels_loaded"], 0);
+  // From a distance of 4 to 200: fine levels at first, the root at the end.
+  EXPECT_LE(json["frames"][0]["finest_level"]["ball"], 1);
+  EXPECT_EQ(json["frames"][2]["finest_level"]["ball"], 5);
+
+  const auto first = read_exr(out() / "frame_0000.exr"), last = read_exr(out() / "frame_0024.exr");
+  ASSERT_TRUE(first && last);
+  EXPECT_EQ(std::get<int>(last->metadata.at("farfield.frame")), 24);
+  EXPECT_EQ(std::get<vec3>(last->metadata.at("camera.position")), vec3(0, 0, 200));
+  EXPECT_EQ(first->image.channel_count(), 8u);
+  const auto alpha = [](const Image& image) { return image.pixel(24, 16)[3]; };
+  EXPECT_EQ(alpha(first->image), 1.0f);
+  EXPECT_LT(alpha(last->image), 1.0f);
+}
+
+// AddressSanitizer's own memory would count.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+TEST_F(Shot, ResidentSetKeepsTheBudget) {
+  testing::write_asset(folder_.path() / "prepared", testing::white_sphere(160));
+  options_.budget_bytes = 8 << 20;  // level 0 alone takes 100000 triangles
+  const auto report = shoot({0, 24, 3});
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_GT(report->peak_accounted_bytes, options_.budget_bytes / 4);
+  EXPECT_LE(report->peak_accounted_bytes, options_.budget_bytes);
+  EXPECT_LE(report->peak_rss_bytes - report->baseline_rss_bytes, options_.budget_bytes * 105 / 100);
+}
+#endif
+
+TEST_F(Shot, SecondRunKeepsFinishedFramesAndRendersTheRest) {
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  const auto first_time = time_of("frame_0012.exr");
+  const nlohmann::json first_record = record();
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  const auto report = shoot({0, 24, 12});
+  ASSERT_TRUE(report);
+  EXPECT_EQ(time_of("frame_0012.exr"), first_time);
+  EXPECT_EQ(record()["frames"].size(), 3u);
+  EXPECT_EQ(record()["frames"][1], first_record["frames"][1]);
+  EXPECT_NE(messages_.find("2 of 3"), std::string::npos);
+}
+
+TEST_F(Shot, OtherOptionsRenderEverythingAnew) {
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  const auto first_time = time_of("frame_0012.exr");
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  options_.trace.seed = 5;
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  EXPECT_NE(time_of("frame_0012.exr"), first_time);
+}
+
+TEST_F(Shot, LostFrameIsRenderedAgain) {
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  const std::vector<std::byte> bytes = test::read_bytes(out() / "frame_0012.exr");
+  std::filesystem::remove(out() / "frame_0012.exr");
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  EXPECT_EQ(test::read_bytes(out() / "frame_0012.exr"), bytes);  // and it is the same
+}
+
+TEST_F(Shot, FrameDoesNotDependOnTheFramesBefore) {
+  ASSERT_TRUE(shoot({0, 24, 6}));
+  ASSERT_TRUE(render_frame(options_, 24, folder_.path() / "alone.exr"));
+  EXPECT_EQ(test::read_bytes(folder_.path() / "alone.exr"), test::read_bytes(out() / "frame_0024.exr"));
+}
+
+TEST_F(Shot, CancelKeepsFinishedFramesAndTheRecord) {
+  std::atomic<bool> cancel{false};
+  options_.cancel = &cancel;
+  options_.progress = [&](double, const std::string& what) { cancel = cancel || what.find("frame 12") == 0; };
+  const auto report = shoot({0, 24, 12});
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().code, ErrorCode::Cancelled);
+  EXPECT_TRUE(std::filesystem::exists(out() / "frame_0000.exr"));
+  EXPECT_FALSE(std::filesystem::exists(out() / "frame_0012.exr"));
+  EXPECT_EQ(record()["frames"].size(), 1u);
+  for (const auto& entry : std::filesystem::directory_iterator(out()))
+    EXPECT_NE(entry.path().filename().string()[0], '.') << entry.path();  // no temporary files
+}
+
+TEST_F(Shot, BudgetBelowTheRootsNamesWhatIsNeeded) {
+  options_.budget_bytes = 1000;
+  const auto report = shoot({0, 0, 1});
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().code, ErrorCode::OutOfBudget);
+}
+
+TEST_F(Shot, FullDetailShowsLevelZeroOnly) {
+  options_.full_detail = true;
+  options_.budget_bytes = 64 << 20;
+  ASSERT_TRUE(render_frame(options_, 24, folder_.path() / "full.exr"));
+  const auto file = read_exr(folder_.path() / "full.exr");
+  for (int y = 0; y < 32; ++y)
+    for (int x = 0; x < 48; ++x) EXPECT_EQ(file->image.pixel(x, y)[4], 0.0f);
+}
+
+TEST_F(Shot, BadArgumentsAreErrors) {
+  options_.width = 0;
+  EXPECT_EQ(shoot({0, 0, 1}).error().code, ErrorCode::InvalidArgument);
+  options_.width = 48;
+  options_.scene = folder_.path() / "none.glb";
+  EXPECT_EQ(shoot({0, 0, 1}).error().code, ErrorCode::NotFound);
+  EXPECT_EQ(render_shot(options_, {0, 0, 1}, folder_.path() / "baker" / "x").error().code, ErrorCode::Io);
 }
 
 }  // namespace
