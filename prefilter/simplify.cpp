@@ -359,17 +359,17 @@ class Simplifier {
     const auto accept = [&](const Placement& placement) -> std::optional<Placement> {
       return is_valid(a, b, placement) ? std::optional(placement) : std::nullopt;
     };
+    const auto optimum = [&] { return place_vertex(ring_, 0.5 * (pa + pb), tolerance).position; };
     if (kind_a_ == VertexKind::Interior && kind_b_ == VertexKind::Interior) {
-      const Placement optimum = place_vertex(ring_, 0.5 * (pa + pb), std::nullopt, tolerance);
-      return accept(keep_vertex(ring_, restore_area(ring_, optimum.position)));
+      const dvec3 x = optimum();
+      return accept(keep_vertex(ring_, restore_area(ring_, x, with_same_volume(ring_, x))));
     }
     if (kind_a_ == VertexKind::Curve && kind_b_ == VertexKind::Curve) {
+      const dvec3 x = optimum();
       const dvec3 p = mesh_.positions[curve_neighbour(spokes_a_, b)],
                   q = mesh_.positions[curve_neighbour(spokes_b_, a)];
-      const auto line = area_preserving_line(p, pa, pb, q);
-      if (!line) return std::nullopt;
-      const double t = glm::dot(0.5 * (pa + pb) - line->point, line->direction) / squared(line->direction);
-      return accept(place_vertex(ring_, line->point + t * line->direction, line, tolerance));
+      const auto limit = with_same_border_area(p, pa, pb, q, x);
+      return limit ? accept(keep_vertex(ring_, restore_area(ring_, x, *limit))) : std::nullopt;
     }
     const bool stays_at_a = kind_b_ == VertexKind::Interior || kind_a_ == VertexKind::Corner;
     return accept(keep_vertex(ring_, stays_at_a ? pa : pb));

@@ -97,68 +97,63 @@ void CollapseRing::clear() {
   neighbours_after.clear();
 }
 
-Placement place_vertex(const CollapseRing& ring, const dvec3& start, const std::optional<PlacementLine>& line,
-                       double tolerance) {
+Placement place_vertex(const CollapseRing& ring, const dvec3& start, double tolerance) {
   dvec3 x = start;
   LeastSquares sums = pair_closest_points(ring, x);
   for (int i = 0; i < kMaxIterations; ++i) {
     const std::optional<dvec3> solution = sums.solution();
     if (!solution) break;
-    dvec3 next = *solution;
-    if (line) {
-      // The sum is a paraboloid around the solution, so the best point of a line is the one nearest to the solution.
-      const double t = glm::dot(next - line->point, line->direction) / squared(line->direction);
-      next = line->point + t * line->direction;
-    }
-    const bool has_converged = squared(next - x) < tolerance * tolerance;
-    x = next;
+    const bool has_converged = squared(*solution - x) < tolerance * tolerance;
+    x = *solution;
     sums = pair_closest_points(ring, x);
     if (has_converged) break;
   }
   return {x, std::sqrt(sums.max_distance2)};
 }
 
-dvec3 restore_area(const CollapseRing& ring, const dvec3& x) {
-  // Six times the volume of the tetrahedra over the triangles, seen from x itself: before it is a number, after it is a
-  // linear function of x's displacement, whose gradient is twice the area vector of the ring.
-  constexpr double kFold = 0.1;  // area vector against area at which a ring counts as half folded
-  double volume = 0, area_before = 0;
-  for (const auto& [a, b, c] : ring.before) {
-    const dvec3 area_vector = glm::cross(b - a, c - a);
-    volume += glm::dot(a - x, area_vector);
-    area_before += glm::length(area_vector);
-  }
-  const auto area_after = [&](const dvec3& tip, dvec3* sum) {
-    double area = 0;
-    for (const auto& [q, s] : ring.after) {
-      const dvec3 area_vector = glm::cross(q - tip, s - tip);
-      if (sum) *sum += area_vector;
-      area += glm::length(area_vector);
-    }
-    return area;
-  };
-  dvec3 gradient(0.0);
-  const double area = area_after(x, &gradient);
-  const double damped = squared(gradient) + kFold * kFold * area * area;
-  if (!(damped > 0)) return x;
-  const dvec3 to_same_volume = gradient * (volume / damped);
-  const double gain = area_after(x + to_same_volume, nullptr) - area;
-  if (gain == 0) return x;
-  return x + std::clamp((area_before - area) / gain, 0.0, 1.0) * to_same_volume;
-}
-
 Placement keep_vertex(const CollapseRing& ring, const dvec3& position) {
   return {position, std::sqrt(pair_closest_points(ring, position).max_distance2)};
 }
 
-std::optional<PlacementLine> area_preserving_line(const dvec3& p, const dvec3& a, const dvec3& b, const dvec3& q) {
+dvec3 restore_area(const CollapseRing& ring, const dvec3& from, const dvec3& to) {
+  // Twice the areas. Between two near points the area is nearly linear.
+  double before = 0;
+  for (const auto& [a, b, c] : ring.before) before += glm::length(glm::cross(b - a, c - a));
+  const auto area_after = [&](const dvec3& x) {
+    double area = 0;
+    for (const auto& [q, s] : ring.after) area += glm::length(glm::cross(q - x, s - x));
+    return area;
+  };
+  const double at_from = area_after(from), at_to = area_after(to);
+  if (at_from == at_to) return from;
+  return from + std::clamp((before - at_from) / (at_to - at_from), 0.0, 1.0) * (to - from);
+}
+
+dvec3 with_same_volume(const CollapseRing& ring, const dvec3& x) {
+  // Six times the volume of the tetrahedra over the triangles, seen from x itself: before it is a number, after it is a
+  // linear function of x's displacement, whose gradient is twice the area vector of the ring.
+  constexpr double kFold = 0.1;  // area vector against area at which a ring counts as half folded
+  double volume = 0, area = 0;
+  for (const auto& [a, b, c] : ring.before) volume += glm::dot(a - x, glm::cross(b - a, c - a));
+  dvec3 gradient(0.0);
+  for (const auto& [q, s] : ring.after) {
+    const dvec3 area_vector = glm::cross(q - x, s - x);
+    gradient += area_vector;
+    area += glm::length(area_vector);
+  }
+  const double damped = squared(gradient) + kFold * kFold * area * area;
+  return damped > 0 ? x + gradient * (volume / damped) : x;
+}
+
+std::optional<dvec3> with_same_border_area(const dvec3& p, const dvec3& a, const dvec3& b, const dvec3& q,
+                                           const dvec3& x) {
   const dvec3 along = q - p;
   const double length2 = squared(along);
   if (!(length2 > 1e-4 * squared(b - a))) return std::nullopt;
   // Twice the area vector of the polygon p a b q must be that of the triangle p x q: (x - p) x (q - p).
   dvec3 area = glm::cross(a - p, b - p) + glm::cross(b - p, along);
   area -= along * (glm::dot(area, along) / length2);
-  return PlacementLine{p + glm::cross(along, area) / length2, along};
+  return p + glm::cross(along, area) / length2 + along * (glm::dot(x - p, along) / length2);
 }
 
 dvec3 closest_barycentric(const dvec3& p, const dvec3& a, const dvec3& b, const dvec3& c) {

@@ -20,11 +20,6 @@ struct CollapseRing {
   void clear();
 };
 
-/// x may move along point + t * direction only.
-struct PlacementLine {
-  dvec3 point, direction;
-};
-
 struct Placement {
   dvec3 position;
   double deviation;  ///< largest distance from a sample of one surface to the other
@@ -32,22 +27,25 @@ struct Placement {
 
 /// Moves x from `start` so that the sum of squared distances between samples of each surface and the other surface
 /// falls, until it moves by less than `tolerance` [eq. 8.2.2]. The sum never grows. Pure function.
-Placement place_vertex(const CollapseRing& ring, const dvec3& start, const std::optional<PlacementLine>& line,
-                       double tolerance);
-
-/// Moves x along the mean normal, at most until the surface encloses the same volume as before, so that its area stays
-/// as near as possible to the area before: the optimum above lies a little inside of curved surfaces, and level by
-/// level they would shrink; with the same volume they would grow. Equal area means that random lines cross the surface
-/// equally often (Cauchy, Crofton). Only for edges away from borders. Where the volume hardly depends on x (folds of
-/// thin sheets), x hardly moves.
-dvec3 restore_area(const CollapseRing& ring, const dvec3& x);
+Placement place_vertex(const CollapseRing& ring, const dvec3& start, double tolerance);
 
 /// The same measure for an x that is given.
 Placement keep_vertex(const CollapseRing& ring, const dvec3& position);
 
-/// Where x may lie so that the border ... p, a, b, q ... encloses the same area as ... p, x, q ...: a line parallel to
-/// pq. Nothing where p and q are so near to each other that there is none.
-std::optional<PlacementLine> area_preserving_line(const dvec3& p, const dvec3& a, const dvec3& b, const dvec3& q);
+/// The point between `from` and `to` where the area after the collapse is nearest to the area before. The optimum above
+/// lies a little inside of curved surfaces, and level by level they would shrink; with the same volume, or the same
+/// area within a tube's end, they would grow. Equal area means that random lines cross the surface equally often
+/// (Cauchy, Crofton), so silhouettes stay.
+dvec3 restore_area(const CollapseRing& ring, const dvec3& from, const dvec3& to);
+
+/// x, moved along the mean normal until the surface encloses the same volume as before. For edges away from borders.
+/// Where the volume hardly depends on x (folds of thin sheets), x hardly moves.
+dvec3 with_same_volume(const CollapseRing& ring, const dvec3& x);
+
+/// x, moved so that the border ... p, x, q ... encloses the same area as ... p, a, b, q ...: perpendicularly to pq.
+/// Nothing where p and q are so near to each other that there is no such place nearby.
+std::optional<dvec3> with_same_border_area(const dvec3& p, const dvec3& a, const dvec3& b, const dvec3& q,
+                                           const dvec3& x);
 
 /// The weights (each in [0, 1], sum 1) of the corners in the triangle's point that is nearest to p. Degenerate
 /// triangles are treated as their longest edge.
