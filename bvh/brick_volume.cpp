@@ -89,25 +89,6 @@ struct Walk {
 
 }  // namespace
 
-RayRange clip_to_box(const LocalRay& ray, const Box3& box) {
-  float t_near = ray.t_near;
-  float t_far = ray.t_far;
-  for (int axis = 0; axis < 3; ++axis) {
-    const float o = ray.origin[axis];
-    const float inverse = 1.0f / ray.direction[axis];
-    if (std::isinf(inverse)) {  // zero, or so little that it never crosses anything
-      if (!(o >= box.lower[axis] && o <= box.upper[axis])) return {1.0f, 0.0f};
-      continue;
-    }
-    const float a = (box.lower[axis] - o) * inverse;
-    const float b = (box.upper[axis] - o) * inverse;
-    if (!(a == a && b == b)) return {1.0f, 0.0f};
-    t_near = std::max(t_near, std::min(a, b));
-    t_far = std::min(t_far, std::max(a, b));
-  }
-  return {t_near, t_far};
-}
-
 /// A ray's way through the grid; lengths in voxels.
 struct BrickVolume::Flight {
   vec3 entry;           ///< where s = 0
@@ -174,6 +155,7 @@ std::optional<VolumeHit> BrickVolume::first_collision(const LocalRay& ray, uint6
   if (is_empty()) return std::nullopt;
   const LocalRay in_voxels{(ray.origin - origin_) * inverse_voxel_size_, ray.direction * inverse_voxel_size_,
                            ray.t_near, ray.t_far};
+  if (!is_traceable(in_voxels)) return std::nullopt;
   const RayRange range = clip_to_box(in_voxels, Box3{vec3(0.0f), vec3(brick_dims_ * kBrickSide)});
   if (range.is_empty() || !std::isfinite(range.t_far)) return std::nullopt;  // an infinite range has no direction
 

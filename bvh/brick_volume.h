@@ -2,6 +2,7 @@
 // Free flights through a level's brick volume.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 
@@ -25,14 +26,32 @@ struct LocalRay {
   float t_far;
 };
 
-/// Where along the ray the box lies: [t_near, t_far] cut to it; empty (t_near > t_far) if the ray misses it. NaN in the
-/// ray gives an empty range.
+/// Where along the ray the box lies: [t_near, t_far] cut to it; empty (t_near > t_far) if the ray misses it. Rays in
+/// the plane of a side are inside. For rays that is_traceable().
 struct RayRange {
   float t_near;
   float t_far;
   bool is_empty() const { return !(t_near <= t_far); }
 };
-RayRange clip_to_box(const LocalRay& ray, const Box3& box);
+inline RayRange clip_to_box(const LocalRay& ray, const Box3& box) {
+  RayRange range{ray.t_near, ray.t_far};
+  for (int axis = 0; axis < 3; ++axis) {
+    const float inverse = 1.0f / ray.direction[axis];
+    // Parallel rays give infinities of the right signs, or NaN (0 * infinity) in the plane of a side: std::min and
+    // std::max keep their first argument then, which leaves the range as it is.
+    const float a = (box.lower[axis] - ray.origin[axis]) * inverse;
+    const float b = (box.upper[axis] - ray.origin[axis]) * inverse;
+    range.t_near = std::max(range.t_near, std::min(a, b));
+    range.t_far = std::min(range.t_far, std::max(a, b));
+  }
+  return range;
+}
+
+/// No NaN, no infinity, and nothing beyond what Embree takes (1.8e18). Zero directions are traceable.
+inline bool is_traceable(const LocalRay& ray) {
+  const vec3 size = glm::abs(ray.origin) + glm::abs(ray.direction);
+  return size.x + size.y + size.z <= 1.8e18f;
+}
 
 /// The microflake volume of a level, as rays see it. Refers to the level's arrays. Immutable; any thread.
 class BrickVolume {

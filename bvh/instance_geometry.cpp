@@ -31,7 +31,7 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kRelativePad = 1e-6f;
 // How much the range in which a ray meets an instance's local bounds is widened: rounding of the slab test.
 constexpr float kRangePad = 1e-6f;
-// The largest coordinate that Embree takes.
+// The largest coordinate that Embree takes: see is_traceable().
 constexpr float kEmbreeLargest = 1.8e18f;
 
 vec3 origin_of(const RTCRay& ray) { return {ray.org_x, ray.org_y, ray.org_z}; }
@@ -80,16 +80,6 @@ bool is_in_range(const glm::dmat3& m) { return is_in_range(m[0]) && is_in_range(
 }  // namespace
 
 // --- Instances -------------------------------------------------------------------------------------------------------
-
-vec3 InstanceRecord::point_to_local(const vec3& p) const {
-  const auto row = [&](const vec4& r) { return r.x * p.x + r.y * p.y + r.z * p.z + r.w; };
-  return {row(world_to_local[0]), row(world_to_local[1]), row(world_to_local[2])};
-}
-
-vec3 InstanceRecord::vector_to_local(const vec3& v) const {
-  const auto row = [&](const vec4& r) { return r.x * v.x + r.y * v.y + r.z * v.z; };
-  return {row(world_to_local[0]), row(world_to_local[1]), row(world_to_local[2])};
-}
 
 vec3 InstanceRecord::normal_to_world(const vec3& n) const {
   return handedness * (n.x * vec3(world_to_local[0]) + n.y * vec3(world_to_local[1]) + n.z * vec3(world_to_local[2]));
@@ -170,10 +160,9 @@ std::optional<InstanceGeometry::Visit> InstanceGeometry::enter(uint32_t instance
   const TracedAsset& asset = *assets[record.asset];
   const LocalRay local{record.point_to_local(origin_of(ray)), record.vector_to_local(direction_of(ray)), ray.tnear,
                        ray.tfar};
+  if (!is_traceable(local)) return std::nullopt;
   const RayRange range = clip_to_box(local, asset.bounds);
   if (!(range.t_near * (1.0f - kRangePad) <= range.t_far * (1.0f + kRangePad))) return std::nullopt;
-
-  if (!is_in_range(local.origin) || !is_in_range(local.direction)) return std::nullopt;
 
   const LevelChoice choice = choose_level(asset, record.footprint, instance, context, range.t_near, forced_lambda);
   const TracedLevel* level = asset.loaded[choice.slot].load(std::memory_order_acquire);
@@ -194,10 +183,12 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, RTCRay
     const InLocalSpace scope(ray, visit->ray);
     on_surface = intersect_surface(visit->level->scene.handle(), embree_context, ray_hit);
   }
-  LocalRay up_to_surface = visit->ray;
-  up_to_surface.t_far = ray.tfar;
-  const std::optional<VolumeHit> collision =
-      visit->level->volume.first_collision(up_to_surface, flight_seed(context, instance));
+  std::optional<VolumeHit> collision;
+  if (!visit->level->volume.is_empty()) {
+    LocalRay up_to_surface = visit->ray;
+    up_to_surface.t_far = ray.tfar;
+    collision = visit->level->volume.first_collision(up_to_surface, flight_seed(context, instance));
+  }
   if (!on_surface && !collision) return false;
 
   HitRecord made;
@@ -234,7 +225,8 @@ bool InstanceGeometry::occluded(uint32_t instance, RTCRay& ray, const RayContext
     rtcOccluded1(visit->level->scene.handle(), embree_context, &ray);
     if (ray.tfar < 0.0f) return true;
   }
-  if (!visit->level->volume.first_collision(visit->ray, flight_seed(context, instance))) return false;
+  const BrickVolume& volume = visit->level->volume;
+  if (volume.is_empty() || !volume.first_collision(visit->ray, flight_seed(context, instance))) return false;
   ray.tfar = -kInfinity;
   return true;
 }

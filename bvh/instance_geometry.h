@@ -23,8 +23,14 @@ struct alignas(64) InstanceRecord {
   uint32_t asset = 0;
   float handedness = 1;  ///< sign of the transform's determinant
 
-  vec3 point_to_local(const vec3& p) const;
-  vec3 vector_to_local(const vec3& v) const;
+  vec3 point_to_local(const vec3& p) const {
+    const auto row = [&](const vec4& r) { return r.x * p.x + r.y * p.y + r.z * p.z + r.w; };
+    return {row(world_to_local[0]), row(world_to_local[1]), row(world_to_local[2])};
+  }
+  vec3 vector_to_local(const vec3& v) const {
+    const auto row = [&](const vec4& r) { return r.x * v.x + r.y * v.y + r.z * v.z; };
+    return {row(world_to_local[0]), row(world_to_local[1]), row(world_to_local[2])};
+  }
   /// World-space normal of a local one, up to scale: transpose(W2L) n; flips under mirroring like a flattened mesh's.
   vec3 normal_to_world(const vec3& n) const;
   /// The linear part of world_to_local.

@@ -33,15 +33,13 @@ struct TracedLevel {
 /// An asset, as rays see it. Stored levels ("slots") are ordered finest first. Between two plans only `loaded` changes,
 /// from null to a level.
 struct TracedAsset {
-  Box3 bounds;                       ///< of all levels, local space
-  std::vector<vec3> hull;            ///< points whose convex hull contains all levels; empty: the corners of bounds
-  float base_resolution = 0;         ///< r_0 > 0
-  std::vector<float> level_numbers;  ///< k of each slot, increasing
-  uint32_t finest_slot = 0;          ///< the plan: no ray may use a finer one
-
-  /// Per slot: the level that rays use in its place; null as long as none was asked for. It is the slot's own level, or
-  /// a coarser one where the slot's file is broken. release/acquire: whoever sees the pointer sees the level.
+  Box3 bounds;                ///< contains all levels with room to spare (padded_bounds), local space
+  float base_resolution = 0;  ///< r_0 > 0
+  uint32_t finest_slot = 0;   ///< the plan: no ray may use a finer one
+  /// Per slot: its level, null as long as none was asked for. release/acquire: whoever sees the pointer sees the level.
   std::unique_ptr<std::atomic<const TracedLevel*>[]> loaded;
+  std::vector<float> level_numbers;  ///< k of each slot, increasing
+  std::vector<vec3> hull;            ///< points whose convex hull contains all levels; empty: the corners of bounds
 
   uint32_t slot_count() const { return static_cast<uint32_t>(level_numbers.size()); }
   float coarsest_number() const { return level_numbers.back(); }
