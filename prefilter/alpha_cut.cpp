@@ -24,7 +24,7 @@ namespace {
 using glm::dvec2;
 
 constexpr double kAreaTolerance = 0.004;  // of the covered area: four times tighter than promised of whole textures
-constexpr double kCoarsestTexels = 3.0;   // first tolerance of the straightening, in texels
+constexpr double kCoarsestTexels = 3.5;   // first tolerance of the straightening, in texels
 constexpr double kFinestTexels = 0.1;     // last one before the outline is taken as it is
 
 /// The triangle in sorted order, with alpha as a function of the lattice.
