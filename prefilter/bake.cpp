@@ -32,7 +32,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint32_t kMaxGrid = 4096;       ///< the brick table has (grid / 8)^3 entries
-constexpr double kWorthWriting = 0.9;     ///< a level is written if it takes at most this share of the one before
+constexpr uint64_t kLeastVoxelBytes = 7;  ///< a byte of density and 6 of SGGX
 constexpr uint32_t kVoxelizeVersion = 1;  ///< goes up when voxelize() or pack_volume() give other results
 
 /// Seconds since it was made.
@@ -202,6 +202,7 @@ class Baker {
   Result<void> bake_source() {
     report_progress("level 0: write", 0);
     LevelReport level_report;
+    level_report.grid = 2 * options_.finest_grid;
     const Stopwatch watch;
     const SurfaceOrder order = order_surface(surface_);
     surface_ = reorder(surface_, order);
@@ -215,6 +216,7 @@ class Baker {
   Result<void> bake_level(uint32_t level, double resolution) {
     LevelReport level_report;
     level_report.level = level;
+    level_report.grid = options_.finest_grid >> (level - 1);
 
     const SurfaceOrder order = simplify_surface(level, resolution, level_report);
     if (is_cancelled()) return cancelled();
@@ -224,8 +226,11 @@ class Baker {
 
     report_progress(fmt::format("level {}: write", level), share_done(level, 0.98));
     const Stopwatch watch;
-    auto done =
-        store_level(pack_level(level, resolution, surface_, order, std::move(*volume), from_stored_), level_report);
+    Result<void> done;
+    if (!level_report.worthless) {
+      done =
+          store_level(pack_level(level, resolution, surface_, order, std::move(*volume), from_stored_), level_report);
+    }
     level_report.write_seconds = watch.seconds();
     report_.levels.push_back(level_report);
     return done;
@@ -242,7 +247,7 @@ class Baker {
     level_report.analysis_seconds = analysis.seconds();
     if (is_cancelled()) return {};
 
-    report_progress(fmt::format("level {}: simplify", level), share_done(level, 0.1));
+    report_progress(fmt::format("level {}: simplify", level), share_done(level, 0.03));
     const Stopwatch simplification;
     const SimplifyResult simplified = simplify(parts.macrosurface, {.resolution = static_cast<float>(resolution)});
     SurfaceOrder order = order_surface(simplified.surface);
@@ -259,18 +264,24 @@ class Baker {
   /// Step V, or its result from an interrupted bake.
   Result<LevelData> voxelize_rest(uint32_t level, double resolution, LevelReport& level_report) {
     const std::string stage = fmt::format("level {}: voxelise", level);
-    report_progress(stage, share_done(level, 0.2));
+    report_progress(stage, share_done(level, 0.05));
     const Stopwatch watch;
     const VoxelLattice lattice{lattice_origin_, resolution};
     const VoxelizeOptions voxelize_options{
         .rays_per_voxel = options_.rays_per_voxel,
         .seed = level,
         .cancel = options_.cancel,
-        .progress = [&](double done) { report_progress(stage, share_done(level, 0.2 + 0.75 * done)); }};
+        .progress = [&](double done) { report_progress(stage, share_done(level, 0.05 + 0.92 * done)); }};
     const uint64_t key = volume_key(sub_resolution_, lattice, voxelize_options);
     if (auto stored = workspace_.load_volume(key)) {
       level_report.resumed = true;
       return std::move(*stored);
+    }
+    if (level != last_level_ &&
+        estimate_voxels(sub_resolution_, lattice) * kLeastVoxelBytes > most_bytes_worth_writing(level)) {
+      level_report.worthless = true;
+      level_report.triangles = surface_.triangles.size();
+      return LevelData{};
     }
     const auto volume = voxelize(sub_resolution_, lattice, voxelize_options);
     if (!volume) return tl::unexpected<Error>(volume.error());
@@ -287,7 +298,6 @@ class Baker {
   /// Writes a level if it is worth its bytes, and notes it in the manifest.
   Result<void> store_level(const LevelData& level, LevelReport& level_report) {
     const uint32_t number = level.header.level;
-    level_report.grid = number == 0 ? 2 * options_.finest_grid : options_.finest_grid >> (number - 1);
     level_report.triangles = face_count(level);
     level_report.voxels = voxel_count(level);
     if (is_cancelled()) return cancelled();
@@ -296,7 +306,8 @@ class Baker {
     const LevelView view = view_of(level);
     const auto cost = options_.measure_resident(view);
     if (!cost) return tl::unexpected<Error>(cost.error());
-    if (!is_worth_writing(number, cost->resident_bytes)) return {};
+    if (cost->resident_bytes > most_bytes_worth_writing(number)) return {};
+    level_report.is_written = true;
 
     LevelEntry entry;
     entry.level = number;
@@ -322,12 +333,12 @@ class Baker {
     return {};
   }
 
-  /// The source always is. A coarser level must save a tenth against the last one written; for the root, which stays
-  /// resident, any saving will do.
-  bool is_worth_writing(uint32_t level, uint64_t resident_bytes) const {
-    if (report_.manifest.levels.empty()) return true;
-    const auto before = static_cast<double>(report_.manifest.levels.back().resident_bytes);
-    return static_cast<double>(resident_bytes) <= (level == last_level_ ? before - 1 : kWorthWriting * before);
+  /// The source is always written. A coarser level must save a tenth against the last one written; for the root, which
+  /// stays resident, any saving will do.
+  uint64_t most_bytes_worth_writing(uint32_t level) const {
+    if (report_.manifest.levels.empty()) return std::numeric_limits<uint64_t>::max();
+    const uint64_t before = report_.manifest.levels.back().resident_bytes;
+    return level == last_level_ ? before - std::min<uint64_t>(before, 1) : before - before / 10;
   }
 
   bool is_cancelled() const { return options_.cancel && options_.cancel->load(std::memory_order_relaxed); }
@@ -335,7 +346,7 @@ class Baker {
 
   /// How much of the whole bake is done when `part` of a level is: levels are weighted by about the rays they cast.
   double share_done(uint32_t level, double part) const {
-    const auto weight = [](uint32_t k) { return std::max(std::pow(0.25, k - 1), 0.01); };
+    const auto weight = [](uint32_t k) { return std::max(std::pow(0.2, k - 1), 0.01); };
     double before = 0, all = 0;
     for (uint32_t k = 1; k <= last_level_; ++k) {
       all += weight(k);

@@ -48,7 +48,9 @@ struct LevelReport {
   uint64_t triangles = 0;               ///< after simplification
   uint64_t voxels = 0;
   double analysis_seconds = 0, simplify_seconds = 0, voxelize_seconds = 0, write_seconds = 0;
-  bool resumed = false;  ///< taken from an earlier, interrupted bake
+  bool resumed = false;     ///< taken from an earlier, interrupted bake
+  bool is_written = false;  ///< false: it saves nothing over a finer level
+  bool worthless = false;   ///< so surely that it was not even voxelised; `voxels` is 0
 };
 
 struct BakeReport {

@@ -11,9 +11,8 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <mutex>
+#include <thread>
 #include <type_traits>
-#include <unordered_map>
 
 #include "base/hash.h"
 #include "base/parallel.h"
@@ -23,190 +22,19 @@
 namespace farfield {
 namespace {
 
-constexpr int kReach = 3;                  ///< voxels: how far a voxel looks, see reaches()
-constexpr int kCoordinateLimit = 1 << 20;  ///< voxels from the lattice's origin
-constexpr uint32_t kMaxRayFactor = 16;     ///< how many times more rays a nearly opaque voxel may get
-constexpr uint32_t kEnoughMisses = 16;     ///< rays that must get through for a transmittance with 25 % noise
+/// Rays start within 1/2 + 3 sigma = 2.3 voxels of a voxel's centre along each axis, rarely so far along two of them,
+/// and are 1 voxel long. From further off than this a plane is hit by less than 1 ray in 1500, and all that is cut off
+/// makes less than 1/1000 of all hits.
+constexpr double kReach = 2.8;
+/// Voxels that touch one with geometry. The others see 1/20 of the hits of one with geometry, or less: for the least
+/// noise in a sum, rays in proportion to the square root of that.
+constexpr double kNearReach = 1;
+constexpr uint32_t kFarShare = 4;
 
-// ---------------------------------------------------------------------------------------------------------------
-// Sets of voxels: bricks of 512 bits, bit x + 8 y of word z.
-
-using BrickMask = std::array<uint64_t, 8>;
-
-struct BrickSet {
-  std::vector<ivec3> coordinates;  ///< sorted by z, then y, then x
-  std::vector<BrickMask> masks;
-};
-
-/// A brick's place in the order of the file, as one number.
-uint64_t brick_key(const ivec3& b) {
-  const auto biased = [](int v) { return static_cast<uint64_t>(v + kCoordinateLimit); };
-  return biased(b.z) << 42 | biased(b.y) << 21 | biased(b.x);
-}
-ivec3 brick_of_key(uint64_t key) {
-  const auto part = [&](int shift) { return static_cast<int>(key >> shift & 0x1fffff) - kCoordinateLimit; };
-  return {part(0), part(21), part(42)};
-}
-
-/// A voxel of a brick: the brick's key and the bit.
-struct MarkedVoxel {
-  uint64_t brick;
-  uint32_t bit;
-  auto operator<=>(const MarkedVoxel&) const = default;
-};
-
-void sort_unique(std::vector<MarkedVoxel>& marks) {
-  std::sort(marks.begin(), marks.end());
-  marks.erase(std::unique(marks.begin(), marks.end()), marks.end());
-}
-
-/// Marks the voxels that a triangle, given in voxel units, may touch: halves it until it is about as small as a voxel,
-/// then takes the box of each piece.
-void mark_triangle(const dvec3& a, const dvec3& b, const dvec3& c, std::vector<MarkedVoxel>& marks) {
-  const dvec3 edge[3] = {b - a, c - b, a - c};
-  const double length2[3] = {glm::dot(edge[0], edge[0]), glm::dot(edge[1], edge[1]), glm::dot(edge[2], edge[2])};
-  const int longest = static_cast<int>(std::max_element(length2, length2 + 3) - length2);
-  if (length2[longest] > 1) {
-    const dvec3 corner[3] = {a, b, c};
-    const dvec3 &from = corner[longest], &to = corner[(longest + 1) % 3], &apex = corner[(longest + 2) % 3];
-    const dvec3 middle = 0.5 * (from + to);
-    mark_triangle(apex, from, middle, marks);
-    mark_triangle(apex, middle, to, marks);
-    return;
-  }
-  const ivec3 lower(glm::floor(glm::min(a, glm::min(b, c)))), upper(glm::floor(glm::max(a, glm::max(b, c))));
-  for (int z = lower.z; z <= upper.z; ++z) {
-    for (int y = lower.y; y <= upper.y; ++y) {
-      for (int x = lower.x; x <= upper.x; ++x) {
-        marks.push_back(
-            {brick_key({x >> 3, y >> 3, z >> 3}), static_cast<uint32_t>((x & 7) + 8 * (y & 7) + 64 * (z & 7))});
-      }
-    }
-  }
-}
-
-/// All voxels that the triangles pass through.
-BrickSet mark_geometry(const Surface& geometry, const VoxelLattice& lattice) {
-  constexpr size_t kGrain = 4096;
-  const size_t chunks = (geometry.triangles.size() + kGrain - 1) / kGrain;
-  std::vector<std::vector<MarkedVoxel>> per_chunk(chunks);
-  parallel_for(geometry.triangles.size(), kGrain, [&](size_t begin, size_t end) {
-    std::vector<MarkedVoxel>& marks = per_chunk[begin / kGrain];
-    const auto to_voxels = [&](uint32_t vertex) {
-      return (dvec3(geometry.positions[vertex]) - lattice.origin) / lattice.voxel_size;
-    };
-    size_t limit = 1 << 20;
-    for (size_t i = begin; i < end; ++i) {
-      const uvec3& t = geometry.triangles[i];
-      mark_triangle(to_voxels(t.x), to_voxels(t.y), to_voxels(t.z), marks);
-      if (marks.size() > limit) {
-        sort_unique(marks);
-        limit = std::max<size_t>(limit, 2 * marks.size());
-      }
-    }
-    sort_unique(marks);
-  });
-
-  std::vector<MarkedVoxel> all;
-  for (std::vector<MarkedVoxel>& marks : per_chunk) {
-    all.insert(all.end(), marks.begin(), marks.end());
-    marks = {};
-  }
-  sort_unique(all);
-  BrickSet set;
-  for (size_t i = 0; i < all.size(); ++i) {
-    if (i == 0 || all[i].brick != all[i - 1].brick) {
-      set.coordinates.push_back(brick_of_key(all[i].brick));
-      set.masks.push_back({});
-    }
-    set.masks.back()[all[i].bit >> 6] |= uint64_t{1} << (all[i].bit & 63);
-  }
-  return set;
-}
-
-/// Half-width along x of the voxels from which rays reach a marked voxel at offset (dy, dz), or -1. Rays start within
-/// 1/2 + 3 sigma = 2.3 voxels along each axis, rarely so far along two of them, and are 1 voxel long. Voxels are kept
-/// whose centre lies within 2.8 voxels of the marked voxel's nearest point: from further off a plane is hit by less
-/// than 1 ray in 1500, and all that is cut off makes less than 1/1000 of all hits.
-int reach_along_x(int dy, int dz) {
-  constexpr double kRadius = 2.8;
-  const auto gap = [](int d) { return std::max(std::abs(d) - 0.5, 0.0); };
-  for (int dx = kReach; dx >= 0; --dx) {
-    if (gap(dx) * gap(dx) + gap(dy) * gap(dy) + gap(dz) * gap(dz) <= kRadius * kRadius) return dx;
-  }
-  return -1;
-}
-
-/// The voxels within reach of those of a set, for one brick. `neighbours`: the masks of the 3^3 bricks around it, x
-/// fastest, null where empty.
-BrickMask widen(const std::array<const BrickMask*, 27>& neighbours) {
-  // Rows of 24 bits along x through the 3^3 bricks, of which the middle 8 are the brick's own.
-  constexpr int kSide = 3 * kBrickSide;
-  std::array<std::array<std::array<uint32_t, kReach + 1>, kSide>, kSide> rows{};  // [z][y][half-width]
-  for (int z = kBrickSide - kReach; z < 2 * kBrickSide + kReach; ++z) {
-    for (int y = kBrickSide - kReach; y < 2 * kBrickSide + kReach; ++y) {
-      uint32_t row = 0;
-      for (int bx = 0; bx < 3; ++bx) {
-        const BrickMask* mask = neighbours[static_cast<size_t>(bx + 3 * (y >> 3) + 9 * (z >> 3))];
-        if (mask) row |= static_cast<uint32_t>((*mask)[static_cast<size_t>(z & 7)] >> (8 * (y & 7)) & 0xff) << (8 * bx);
-      }
-      auto& widened = rows[static_cast<size_t>(z)][static_cast<size_t>(y)];
-      widened[0] = row;
-      for (size_t w = 1; w <= kReach; ++w) widened[w] = widened[w - 1] | row << w | row >> w;
-    }
-  }
-  BrickMask result{};
-  for (int dz = -kReach; dz <= kReach; ++dz) {
-    for (int dy = -kReach; dy <= kReach; ++dy) {
-      const int half_width = reach_along_x(dy, dz);
-      if (half_width < 0) continue;
-      for (int z = 0; z < kBrickSide; ++z) {
-        for (int y = 0; y < kBrickSide; ++y) {
-          const uint32_t row = rows[static_cast<size_t>(kBrickSide + z + dz)][static_cast<size_t>(kBrickSide + y + dy)]
-                                   [static_cast<size_t>(half_width)];
-          result[static_cast<size_t>(z)] |= static_cast<uint64_t>(row >> kBrickSide & 0xff) << (8 * y);
-        }
-      }
-    }
-  }
-  return result;
-}
-
-/// All voxels within reach of a set.
-BrickSet widen(const BrickSet& marked) {
-  std::unordered_map<uint64_t, const BrickMask*> mask_of;
-  std::vector<uint64_t> keys;
-  for (size_t i = 0; i < marked.coordinates.size(); ++i) {
-    mask_of[brick_key(marked.coordinates[i])] = &marked.masks[i];
-    for (int n = 0; n < 27; ++n) {
-      keys.push_back(brick_key(marked.coordinates[i] + ivec3(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)));
-    }
-  }
-  std::sort(keys.begin(), keys.end());
-  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
-
-  std::vector<BrickMask> masks(keys.size());
-  parallel_for(keys.size(), 64, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      std::array<const BrickMask*, 27> neighbours{};
-      for (int n = 0; n < 27; ++n) {
-        const auto found = mask_of.find(brick_key(brick_of_key(keys[i]) + ivec3(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)));
-        if (found != mask_of.end()) neighbours[static_cast<size_t>(n)] = found->second;
-      }
-      masks[i] = widen(neighbours);
-    }
-  });
-  BrickSet result;
-  for (size_t i = 0; i < keys.size(); ++i) {
-    if (masks[i] == BrickMask{}) continue;
-    result.coordinates.push_back(brick_of_key(keys[i]));
-    result.masks.push_back(masks[i]);
-  }
-  return result;
-}
-
-// ---------------------------------------------------------------------------------------------------------------
-// Rays.
+constexpr uint32_t kMaxRayFactor = 16;  ///< how many times more rays than asked for a voxel may get
+constexpr uint32_t kEnoughMisses = 16;  ///< rays that must get through for a transmittance with 25 % noise
+constexpr uint64_t kRaysForTheWhole =
+    10'000'000;  ///< a few seconds: coarse levels have few voxels, and can afford them
 
 struct DeleteDevice {
   void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
@@ -351,30 +179,46 @@ void cast_rays(RTCScene scene, const Surface& geometry, const vec3& center, floa
   }
 }
 
-/// One voxel, or one with density 0 where no ray hits.
-Voxel measure_voxel(RTCScene scene, const Surface& geometry, const VoxelLattice& lattice, const ivec3& coordinate,
-                    const VoxelizeOptions& options) {
-  const vec3 center(lattice.origin + (dvec3(coordinate) + 0.5) * lattice.voxel_size);
-  const float voxel_size = static_cast<float>(lattice.voxel_size);
-  const uint64_t place =
-      static_cast<uint64_t>(static_cast<uint32_t>(coordinate.x)) << 32 | static_cast<uint32_t>(coordinate.y);
-  SplitMix random(mix64(mix64(options.seed, place), static_cast<uint32_t>(coordinate.z)));
+/// What all voxels of a volume have in common.
+struct Measurement {
+  const Surface& geometry;
+  const VoxelLattice& lattice;
+  RTCScene scene;
+  uint32_t rays;  ///< per voxel near geometry
+  uint64_t seed;
+};
+
+SplitMix random_of_voxel(const ivec3& coordinate, uint64_t seed) {
+  const auto bits = [](int v) { return static_cast<uint64_t>(static_cast<uint32_t>(v)); };
+  return SplitMix(mix64(mix64(seed, bits(coordinate.x) << 32 | bits(coordinate.y)), bits(coordinate.z)));
+}
+
+/// One voxel, or one with density 0 where no ray hits or chance has it so.
+Voxel measure_voxel(const Measurement& m, const ivec3& coordinate, bool is_near) {
+  const double size = m.lattice.voxel_size;
+  const vec3 center(m.lattice.origin + (dvec3(coordinate) + 0.5) * size);
+  SplitMix random = random_of_voxel(coordinate, m.seed);
 
   HitSums sums;
-  uint32_t rays = options.rays_per_voxel;
-  cast_rays(scene, geometry, center, voxel_size, rays, random, sums);
+  const uint32_t first_rays = is_near ? m.rays : (m.rays + kFarShare - 1) / kFarShare;
+  uint32_t rays = first_rays;
+  cast_rays(m.scene, m.geometry, center, static_cast<float>(size), rays, random, sums);
   // A transmittance that is the share of a handful of rays is mostly noise: cast as many rays again until it is not.
-  while (rays - sums.hits < kEnoughMisses && rays < kMaxRayFactor * options.rays_per_voxel) {
-    cast_rays(scene, geometry, center, voxel_size, rays, random, sums);
+  while (rays - sums.hits < kEnoughMisses && rays < kMaxRayFactor * first_rays && sums.hits > rays / 2) {
+    cast_rays(m.scene, m.geometry, center, static_cast<float>(size), rays, random, sums);
     rays *= 2;
   }
-
   Voxel voxel;
   if (sums.hits == 0) return voxel;
+
+  double depth = optical_depth_of_hits(sums.hits, rays);
+  if (depth < kFaintestDepth) {
+    if (to_unit_float(random.next()) * kFaintestDepth >= depth) return voxel;
+    depth = kFaintestDepth;
+  }
   const float share = 1 / static_cast<float>(sums.hits);
   voxel.sggx = normalise_sggx(sums.sggx).sggx;
-  voxel.density =
-      static_cast<float>(solve_density(voxel.sggx, optical_depth_of_hits(sums.hits, rays), lattice.voxel_size));
+  voxel.density = static_cast<float>(solve_density(voxel.sggx, depth, size));
   voxel.diffuse = sums.diffuse * share;
   voxel.specular = sums.specular * share;
   voxel.transmission = sums.transmission * share;
@@ -382,20 +226,19 @@ Voxel measure_voxel(RTCScene scene, const Surface& geometry, const VoxelLattice&
   return voxel;
 }
 
-/// The voxels of one candidate brick that rays hit; the mask says which.
-std::vector<Voxel> measure_brick(RTCScene scene, const Surface& geometry, const VoxelLattice& lattice,
-                                 const ivec3& brick, BrickMask& mask, const VoxelizeOptions& options) {
+/// The voxels of one candidate brick that are kept; `mask` then says which. `near`: those near geometry, or null.
+std::vector<Voxel> measure_brick(const Measurement& m, const ivec3& brick, VoxelMask& mask, const VoxelMask* near) {
   std::vector<Voxel> voxels;
   for (int i = 0; i < kBrickVoxels; ++i) {
-    uint64_t& word = mask[static_cast<size_t>(i >> 6)];
+    const auto word = static_cast<size_t>(i >> 6);
     const uint64_t bit = uint64_t{1} << (i & 63);
-    if (!(word & bit)) continue;
+    if (!(mask[word] & bit)) continue;
     const ivec3 coordinate = brick * kBrickSide + ivec3(i & 7, i >> 3 & 7, i >> 6);
-    const Voxel voxel = measure_voxel(scene, geometry, lattice, coordinate, options);
+    const Voxel voxel = measure_voxel(m, coordinate, near && ((*near)[word] & bit));
     if (voxel.density > 0) {
       voxels.push_back(voxel);
     } else {
-      word &= ~bit;
+      mask[word] &= ~bit;
     }
   }
   return voxels;
@@ -405,61 +248,65 @@ bool is_cancelled(const VoxelizeOptions& options) {
   return options.cancel && options.cancel->load(std::memory_order_relaxed);  // relaxed: only a flag, it guards no data
 }
 
-/// Counts finished bricks and passes the share on, one caller at a time.
-class Progress {
- public:
-  Progress(size_t total, const std::function<void(double)>& report) : total_(total), report_(report) {}
-  void add(size_t done) {
-    if (!report_) return;
-    const std::lock_guard lock(mutex_);
-    done_ += done;
-    report_(static_cast<double>(done_) / static_cast<double>(total_));
-  }
-
- private:
-  const size_t total_;
-  const std::function<void(double)>& report_;
-  std::mutex mutex_;
-  size_t done_ = 0;  // guarded by mutex_
-};
-
-}  // namespace
-
-Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options) {
+Result<void> check_arguments(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options) {
   if (!(lattice.voxel_size > 0) || options.rays_per_voxel == 0) {
     return make_error(ErrorCode::InvalidArgument,
                       fmt::format("voxelize: voxel size {} and rays per voxel {} must be positive", lattice.voxel_size,
                                   options.rays_per_voxel));
   }
-  SparseVolume volume;
-  volume.lattice = lattice;
-  if (geometry.triangles.empty()) return volume;
+  if (geometry.triangles.empty()) return {};
   const Box3 bounds = geometry.bounds();
   const dvec3 furthest =
       glm::max(glm::abs(dvec3(bounds.lower) - lattice.origin), glm::abs(dvec3(bounds.upper) - lattice.origin));
-  if (!(std::max({furthest.x, furthest.y, furthest.z}) < (kCoordinateLimit - 64) * lattice.voxel_size)) {
+  if (!(std::max({furthest.x, furthest.y, furthest.z}) < (kVoxelLimit - 64) * lattice.voxel_size)) {
     return make_error(ErrorCode::InvalidArgument,
                       fmt::format("voxelize: geometry reaches further than {} voxels of {} from the lattice's origin",
-                                  kCoordinateLimit - 64, lattice.voxel_size));
+                                  kVoxelLimit - 64, lattice.voxel_size));
   }
+  return {};
+}
 
-  BrickSet candidates = widen(mark_geometry(geometry, lattice));
+/// Few voxels get more rays than asked for: a coarse level can afford them, and a single voxel shows more there.
+uint32_t rays_per_voxel(uint64_t voxels, const VoxelizeOptions& options) {
+  const uint64_t factor = std::clamp<uint64_t>(kManyVoxels / std::max<uint64_t>(voxels, 1), 1, kMaxRayFactor);
+  return static_cast<uint32_t>(factor) * options.rays_per_voxel;
+}
+
+}  // namespace
+
+Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options) {
+  if (auto checked = check_arguments(geometry, lattice, options); !checked) {
+    return tl::unexpected<Error>(checked.error());
+  }
+  SparseVolume volume;
+  volume.lattice = lattice;
+  if (geometry.triangles.empty()) return volume;
+
+  const VoxelSet marked = mark_voxels(geometry, lattice);
+  const VoxelSet near = widen(marked, kNearReach);
+  VoxelSet candidates = widen(marked, kReach);
   const RayScene rays(geometry);
   if (!rays.is_valid())
     return make_error(ErrorCode::Io, "voxelize: Embree could not build the geometry (out of memory?)");
+  const Measurement measurement{geometry, lattice, rays.scene(), rays_per_voxel(near.size(), options), options.seed};
 
   const size_t brick_count = candidates.coordinates.size();
   std::vector<std::vector<Voxel>> voxels(brick_count);
-  Progress progress(brick_count, options.progress);
+  std::atomic<size_t> done{0};  // relaxed: only for the progress
+  const std::thread::id caller = std::this_thread::get_id();
   parallel_for(brick_count, 4, [&](size_t begin, size_t end) {
     if (is_cancelled(options)) return;
     for (size_t i = begin; i < end; ++i) {
-      voxels[i] =
-          measure_brick(rays.scene(), geometry, lattice, candidates.coordinates[i], candidates.masks[i], options);
+      const ivec3& coordinate = candidates.coordinates[i];
+      voxels[i] = measure_brick(measurement, coordinate, candidates.masks[i], near.find(coordinate));
     }
-    progress.add(end - begin);
+    const size_t bricks_done = done.fetch_add(end - begin, std::memory_order_relaxed) + end - begin;
+    if (options.progress && std::this_thread::get_id() == caller) {
+      options.progress(static_cast<double>(bricks_done) / static_cast<double>(brick_count));
+    }
   });
   if (is_cancelled(options)) return make_error(ErrorCode::Cancelled, "voxelize: cancelled");
+  if (options.progress) options.progress(1);
 
   for (size_t i = 0; i < brick_count; ++i) {
     if (voxels[i].empty()) continue;
@@ -468,6 +315,19 @@ Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& latti
     voxels[i] = {};
   }
   return volume;
+}
+
+uint64_t estimate_voxels(const Surface& geometry, const VoxelLattice& lattice) {
+  if (!check_arguments(geometry, lattice, {}) || geometry.triangles.empty()) return 0;
+  double area = 0;
+  for (const uvec3& t : geometry.triangles) {
+    const dvec3 a(geometry.positions[t.x]);
+    area += 0.5 * glm::length(glm::cross(dvec3(geometry.positions[t.y]) - a, dvec3(geometry.positions[t.z]) - a));
+  }
+  // The mean optical depths of all voxels add up to half the area; where it is spread thin, each voxel that is kept
+  // takes kFaintestDepth of it.
+  const double depth = 0.5 * area / (lattice.voxel_size * lattice.voxel_size);
+  return std::min(mark_voxels(geometry, lattice).size(), static_cast<uint64_t>(0.5 * depth / kFaintestDepth));
 }
 
 }  // namespace farfield

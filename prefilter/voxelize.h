@@ -10,18 +10,11 @@
 
 #include "base/result.h"
 #include "base/vec.h"
-#include "cache/level.h"
 #include "prefilter/surface.h"
+#include "prefilter/voxel_marks.h"
 #include "scattering/sym_mat3.h"
 
 namespace farfield {
-
-/// Where voxels lie: voxel (i, j, k) covers origin + [i, i+1] x [j, j+1] x [k, k+1] * voxel_size. The lattices of all
-/// levels of an asset share the origin, so that 8 voxels of one level fill one voxel of the next.
-struct VoxelLattice {
-  dvec3 origin{0.0};
-  double voxel_size = 0;  ///< > 0, scene units
-};
 
 /// A voxel's microflakes, in full precision.
 struct Voxel {
@@ -36,8 +29,8 @@ struct Voxel {
 /// 8^3 voxels of the lattice, from kBrickSide * coordinate upwards.
 struct VoxelBrick {
   ivec3 coordinate{0};
-  std::array<uint64_t, 8> mask{};  ///< bit x + 8 y of word z: the voxel is stored
-  uint64_t first_voxel = 0;        ///< of the stored ones, in the order of the bits
+  VoxelMask mask{};          ///< the stored voxels
+  uint64_t first_voxel = 0;  ///< of the stored ones, in the order of the bits
 };
 
 /// Sparse voxels: only what rays have hit.
@@ -48,15 +41,25 @@ struct SparseVolume {
 };
 
 struct VoxelizeOptions {
-  uint32_t rays_per_voxel = 200;  ///< > 0; voxels that let almost nothing through get up to 16 times as many
-  uint64_t seed = 0;              ///< with the voxel's coordinate it fixes the voxel's rays
+  uint32_t rays_per_voxel = 200;                ///< > 0; see voxelize()
+  uint64_t seed = 0;                            ///< with the voxel's coordinate it fixes the voxel's rays
   const std::atomic<bool>* cancel = nullptr;    ///< polled for every few bricks
-  std::function<void(double done)> progress{};  ///< done in [0, 1]; from any thread, one call at a time
+  std::function<void(double done)> progress{};  ///< done in [0, 1]; called from the calling thread
 };
 
-/// Measures the volume of all triangles of `geometry`, with the rays of thesis algorithm 1. The lattice's origin is in
-/// the space of geometry.positions. Empty geometry gives an empty volume. The result does not depend on the number of
-/// threads. Errors: Cancelled; InvalidArgument (options, or geometry further than a million voxels from the origin).
+/// Mean optical depth over a voxel's side below which voxels are thinned out.
+inline constexpr double kFaintestDepth = 0.02;
+
+/// Measures the volume of all triangles of `geometry`, with the rays of thesis algorithm 1. Each voxel that the
+/// geometry touches or that is next to such a one gets rays_per_voxel; up to 16 times as many where almost nothing gets
+/// through, and where there are few voxels; a quarter where the geometry is 2 or 3 voxels away. Of the voxels fainter
+/// than kFaintestDepth only a random share is kept, with that depth, so that on average nothing is lost.
+/// The lattice's origin is in the space of geometry.positions. Empty geometry gives an empty volume. The result does
+/// not depend on the number of threads. Errors: Cancelled; InvalidArgument (options, or geometry further than about a
+/// million voxels from the origin); Io (out of memory in Embree).
 Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options);
+
+/// About how many voxels voxelize() will store, at least. Takes no rays: a small part of its time.
+uint64_t estimate_voxels(const Surface& geometry, const VoxelLattice& lattice);
 
 }  // namespace farfield

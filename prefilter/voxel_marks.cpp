@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prefilter/voxel_marks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "base/check.h"
+#include "base/parallel.h"
+
+namespace farfield {
+namespace {
+
+/// A brick's place in the order of the file, as one number.
+uint64_t brick_key(const ivec3& b) {
+  const auto biased = [](int v) { return static_cast<uint64_t>(v + kVoxelLimit); };
+  return biased(b.z) << 42 | biased(b.y) << 21 | biased(b.x);
+}
+ivec3 brick_of_key(uint64_t key) {
+  const auto part = [&](int shift) { return static_cast<int>(key >> shift & 0x1fffff) - kVoxelLimit; };
+  return {part(0), part(21), part(42)};
+}
+
+/// A voxel of a brick: the brick's key and the bit.
+struct MarkedVoxel {
+  uint64_t brick;
+  uint32_t bit;
+  auto operator<=>(const MarkedVoxel&) const = default;
+};
+
+void sort_unique(std::vector<MarkedVoxel>& marks) {
+  std::sort(marks.begin(), marks.end());
+  marks.erase(std::unique(marks.begin(), marks.end()), marks.end());
+}
+
+/// Marks the voxels that a triangle, given in voxel units, may touch: halves it until it is about as small as a voxel,
+/// then takes the box of each piece.
+void mark_triangle(const dvec3& a, const dvec3& b, const dvec3& c, std::vector<MarkedVoxel>& marks) {
+  const dvec3 edge[3] = {b - a, c - b, a - c};
+  const double length2[3] = {glm::dot(edge[0], edge[0]), glm::dot(edge[1], edge[1]), glm::dot(edge[2], edge[2])};
+  const int longest = static_cast<int>(std::max_element(length2, length2 + 3) - length2);
+  if (length2[longest] > 1) {
+    const dvec3 corner[3] = {a, b, c};
+    const dvec3 &from = corner[longest], &to = corner[(longest + 1) % 3], &apex = corner[(longest + 2) % 3];
+    const dvec3 middle = 0.5 * (from + to);
+    mark_triangle(apex, from, middle, marks);
+    mark_triangle(apex, middle, to, marks);
+    return;
+  }
+  const ivec3 lower(glm::floor(glm::min(a, glm::min(b, c)))), upper(glm::floor(glm::max(a, glm::max(b, c))));
+  for (int z = lower.z; z <= upper.z; ++z) {
+    for (int y = lower.y; y <= upper.y; ++y) {
+      for (int x = lower.x; x <= upper.x; ++x) {
+        marks.push_back(
+            {brick_key({x >> 3, y >> 3, z >> 3}), static_cast<uint32_t>((x & 7) + 8 * (y & 7) + 64 * (z & 7))});
+      }
+    }
+  }
+}
+
+/// Half-width along x of the voxels whose centres are within reach of a voxel at offset (dy, dz), or -1.
+int reach_along_x(int dy, int dz, double reach) {
+  const auto gap = [](int d) { return std::max(std::abs(d) - 0.5, 0.0); };
+  for (int dx = kMaxReach; dx >= 0; --dx) {
+    if (gap(dx) * gap(dx) + gap(dy) * gap(dy) + gap(dz) * gap(dz) <= reach * reach) return dx;
+  }
+  return -1;
+}
+
+/// The voxels within reach of those of a set, for one brick. `neighbours`: the masks of the 3^3 bricks around it, x
+/// fastest, null where empty.
+VoxelMask widen_brick(const std::array<const VoxelMask*, 27>& neighbours, double reach) {
+  // Rows of 24 bits along x through the 3^3 bricks, of which the middle 8 are the brick's own.
+  constexpr int kSide = 3 * kBrickSide;
+  std::array<std::array<std::array<uint32_t, kMaxReach + 1>, kSide>, kSide> rows{};  // [z][y][half-width]
+  for (int z = kBrickSide - kMaxReach; z < 2 * kBrickSide + kMaxReach; ++z) {
+    for (int y = kBrickSide - kMaxReach; y < 2 * kBrickSide + kMaxReach; ++y) {
+      uint32_t row = 0;
+      for (int bx = 0; bx < 3; ++bx) {
+        const VoxelMask* mask = neighbours[static_cast<size_t>(bx + 3 * (y >> 3) + 9 * (z >> 3))];
+        if (mask) row |= static_cast<uint32_t>((*mask)[static_cast<size_t>(z & 7)] >> (8 * (y & 7)) & 0xff) << (8 * bx);
+      }
+      auto& widened = rows[static_cast<size_t>(z)][static_cast<size_t>(y)];
+      widened[0] = row;
+      for (size_t w = 1; w <= kMaxReach; ++w) widened[w] = widened[w - 1] | row << w | row >> w;
+    }
+  }
+  VoxelMask result{};
+  for (int dz = -kMaxReach; dz <= kMaxReach; ++dz) {
+    for (int dy = -kMaxReach; dy <= kMaxReach; ++dy) {
+      const int half_width = reach_along_x(dy, dz, reach);
+      if (half_width < 0) continue;
+      for (int z = 0; z < kBrickSide; ++z) {
+        for (int y = 0; y < kBrickSide; ++y) {
+          const uint32_t row = rows[static_cast<size_t>(kBrickSide + z + dz)][static_cast<size_t>(kBrickSide + y + dy)]
+                                   [static_cast<size_t>(half_width)];
+          result[static_cast<size_t>(z)] |= static_cast<uint64_t>(row >> kBrickSide & 0xff) << (8 * y);
+        }
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+uint64_t VoxelSet::size() const {
+  uint64_t count = 0;
+  for (const VoxelMask& mask : masks) {
+    for (const uint64_t word : mask) count += static_cast<uint64_t>(__builtin_popcountll(word));
+  }
+  return count;
+}
+
+const VoxelMask* VoxelSet::find(const ivec3& coordinate) const {
+  const auto before = [](const ivec3& a, const ivec3& b) { return brick_key(a) < brick_key(b); };
+  const auto found = std::lower_bound(coordinates.begin(), coordinates.end(), coordinate, before);
+  if (found == coordinates.end() || *found != coordinate) return nullptr;
+  return &masks[static_cast<size_t>(found - coordinates.begin())];
+}
+
+VoxelSet mark_voxels(const Surface& geometry, const VoxelLattice& lattice) {
+  constexpr size_t kGrain = 4096;
+  const size_t chunks = (geometry.triangles.size() + kGrain - 1) / kGrain;
+  std::vector<std::vector<MarkedVoxel>> per_chunk(chunks);
+  parallel_for(geometry.triangles.size(), kGrain, [&](size_t begin, size_t end) {
+    std::vector<MarkedVoxel>& marks = per_chunk[begin / kGrain];
+    const auto to_voxels = [&](uint32_t vertex) {
+      return (dvec3(geometry.positions[vertex]) - lattice.origin) / lattice.voxel_size;
+    };
+    size_t limit = 1 << 20;
+    for (size_t i = begin; i < end; ++i) {
+      const uvec3& t = geometry.triangles[i];
+      mark_triangle(to_voxels(t.x), to_voxels(t.y), to_voxels(t.z), marks);
+      if (marks.size() > limit) {
+        sort_unique(marks);
+        limit = std::max<size_t>(limit, 2 * marks.size());
+      }
+    }
+    sort_unique(marks);
+  });
+
+  std::vector<MarkedVoxel> all;
+  for (std::vector<MarkedVoxel>& marks : per_chunk) {
+    all.insert(all.end(), marks.begin(), marks.end());
+    marks = {};
+  }
+  sort_unique(all);
+  VoxelSet set;
+  for (size_t i = 0; i < all.size(); ++i) {
+    if (i == 0 || all[i].brick != all[i - 1].brick) {
+      set.coordinates.push_back(brick_of_key(all[i].brick));
+      set.masks.push_back({});
+    }
+    set.masks.back()[all[i].bit >> 6] |= uint64_t{1} << (all[i].bit & 63);
+  }
+  return set;
+}
+
+VoxelSet widen(const VoxelSet& set, double reach) {
+  FARFIELD_CHECK(reach <= kMaxReach);
+  std::unordered_map<uint64_t, const VoxelMask*> mask_of;
+  std::vector<uint64_t> keys;
+  for (size_t i = 0; i < set.coordinates.size(); ++i) {
+    mask_of[brick_key(set.coordinates[i])] = &set.masks[i];
+    for (int n = 0; n < 27; ++n) {
+      keys.push_back(brick_key(set.coordinates[i] + ivec3(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)));
+    }
+  }
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+
+  std::vector<VoxelMask> masks(keys.size());
+  parallel_for(keys.size(), 64, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      std::array<const VoxelMask*, 27> neighbours{};
+      for (int n = 0; n < 27; ++n) {
+        const auto found = mask_of.find(brick_key(brick_of_key(keys[i]) + ivec3(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)));
+        if (found != mask_of.end()) neighbours[static_cast<size_t>(n)] = found->second;
+      }
+      masks[i] = widen_brick(neighbours, reach);
+    }
+  });
+  VoxelSet result;
+  for (size_t i = 0; i < keys.size(); ++i) {
+    if (masks[i] == VoxelMask{}) continue;
+    result.coordinates.push_back(brick_of_key(keys[i]));
+    result.masks.push_back(masks[i]);
+  }
+  return result;
+}
+
+}  // namespace farfield

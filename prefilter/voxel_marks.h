@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sets of voxels near geometry: the candidates of a voxelisation.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "base/vec.h"
+#include "cache/level.h"
+#include "prefilter/surface.h"
+
+namespace farfield {
+
+/// Where voxels lie: voxel (i, j, k) covers origin + [i, i+1] x [j, j+1] x [k, k+1] * voxel_size. The lattices of all
+/// levels of an asset share the origin, so that 8 voxels of one level fill one voxel of the next.
+struct VoxelLattice {
+  dvec3 origin{0.0};
+  double voxel_size = 0;  ///< > 0, scene units
+};
+
+/// Voxels must be less than this far from the lattice's origin, in voxels.
+inline constexpr int kVoxelLimit = 1 << 20;
+
+/// 8^3 voxels: bit x + 8 y of word z.
+using VoxelMask = std::array<uint64_t, 8>;
+
+/// A set of voxels, by the bricks (from kBrickSide * coordinate upwards) that hold some.
+struct VoxelSet {
+  std::vector<ivec3> coordinates;  ///< of bricks; sorted by z, then y, then x
+  std::vector<VoxelMask> masks;    ///< one per brick, not 0
+
+  uint64_t size() const;
+  /// The mask of a brick, or null.
+  const VoxelMask* find(const ivec3& coordinate) const;
+};
+
+/// All voxels that triangles pass through, and some that they pass by within a voxel. All geometry must lie within
+/// kVoxelLimit - 64 voxels of the origin. Deterministic for any thread count.
+VoxelSet mark_voxels(const Surface& geometry, const VoxelLattice& lattice);
+
+/// The largest reach of widen().
+inline constexpr int kMaxReach = 3;
+
+/// All voxels whose centre is within `reach` voxels (at most kMaxReach) of the nearest point of one of the set.
+VoxelSet widen(const VoxelSet& set, double reach);
+
+}  // namespace farfield
