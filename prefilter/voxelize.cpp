@@ -31,10 +31,9 @@ constexpr double kReach = 2.8;
 constexpr double kNearReach = 1;
 constexpr uint32_t kFarShare = 4;
 
-constexpr uint32_t kMaxRayFactor = 16;  ///< how many times more rays than asked for a voxel may get
-constexpr uint32_t kEnoughMisses = 16;  ///< rays that must get through for a transmittance with 25 % noise
-constexpr uint64_t kRaysForTheWhole =
-    10'000'000;  ///< a few seconds: coarse levels have few voxels, and can afford them
+constexpr uint32_t kMaxRayFactor = 16;    ///< how many times more rays than asked for a voxel may get
+constexpr uint32_t kEnoughMisses = 16;    ///< rays that must get through for a transmittance with 25 % noise
+constexpr uint64_t kManyVoxels = 50'000;  ///< fewer voxels share the rays of this many: seconds of one core
 
 struct DeleteDevice {
   void operator()(RTCDevice device) const { rtcReleaseDevice(device); }

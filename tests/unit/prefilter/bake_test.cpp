@@ -368,8 +368,8 @@ TEST_F(Bake, LeavesOutLevelsThatSaveNothing) {
   BakeOptions options = small_options();
   int call = 0;
   options.measure_resident = [&](const LevelView&) {  // levels 0 to 4
-    const uint64_t bytes[] = {1000, 950, 500, 460, 455};
-    return Result<ResidentCost>(ResidentCost{bytes[call++], 1});
+    const uint64_t megabytes[] = {1000, 950, 500, 460, 455};
+    return Result<ResidentCost>(ResidentCost{megabytes[call++] << 20, 1});
   };
   const auto report = bake(ball_in_leaves(), "thing", out(), options);
   ASSERT_TRUE(report.has_value());
@@ -380,6 +380,20 @@ TEST_F(Bake, LeavesOutLevelsThatSaveNothing) {
   const auto levels = open_levels(out());
   EXPECT_EQ(levels[1]->view().morph_face.size(), face_count(levels[0]->view()));  // from level 0, not level 1
   EXPECT_EQ(levels[2]->view().morph_face.size(), face_count(levels[1]->view()));
+}
+
+TEST_F(Bake, DoesNotVoxeliseWhatCannotSaveAnything) {
+  BakeOptions options = small_options();
+  options.measure_resident = [](const LevelView& level) {
+    return Result<ResidentCost>(ResidentCost{level.header.level == 0 ? 10000u : 1000u >> level.header.level, 1});
+  };
+  const auto report = bake(ball_in_leaves(), "thing", out(), options);
+  ASSERT_TRUE(report.has_value());
+  EXPECT_TRUE(report->levels[1].worthless);
+  EXPECT_FALSE(report->levels[1].is_written);
+  EXPECT_FALSE(report->levels.back().worthless);
+  EXPECT_TRUE(report->levels.back().is_written);
+  open_levels(out());
 }
 
 TEST_F(Bake, RefusesSenselessOptions) {
