@@ -339,13 +339,16 @@ class Simplifier {
       ring_.after.push_back({position(q), position(s)});
     }
     ring_.samples_before = {position(a), position(b), 0.5 * (position(a) + position(b))};
+    longest_spoke_ = 0;
     for (const Spoke& spoke : spokes_a_) {
       if (spoke.vertex == b) continue;
+      longest_spoke_ = std::max(longest_spoke_, glm::length(position(spoke.vertex) - position(a)));
       ring_.samples_before.push_back(0.5 * (position(a) + position(spoke.vertex)));
       ring_.neighbours_after.push_back(position(spoke.vertex));
     }
     for (const Spoke& spoke : spokes_b_) {
       if (spoke.vertex == a) continue;
+      longest_spoke_ = std::max(longest_spoke_, glm::length(position(spoke.vertex) - position(b)));
       ring_.samples_before.push_back(0.5 * (position(b) + position(spoke.vertex)));
       const bool is_common = std::binary_search(common_.begin(), common_.end(), spoke.vertex);
       if (!is_common) ring_.neighbours_after.push_back(position(spoke.vertex));
@@ -387,13 +390,12 @@ class Simplifier {
     const double total_deviation = placement.deviation + std::max(mesh_.deviation[a], mesh_.deviation[b]);
     if (!(total_deviation <= kMaxDeviation * resolution_)) return false;
 
-    double longest2 = kLongEdge * kLongEdge * resolution_ * resolution_;
-    for (const dvec3& sample : ring_.samples_before) {
-      longest2 = std::max(longest2,
-                          4.0 * std::min(squared(sample - mesh_.positions[a]), squared(sample - mesh_.positions[b])));
-    }
+    // Where the source is coarser than that, edges may grow a little: a tube's ring could not merge otherwise.
+    const double edge = glm::length(mesh_.positions[b] - mesh_.positions[a]);
+    const double limit = kLongEdge * resolution_;
+    const double longest = longest_spoke_ > limit ? longest_spoke_ + 0.5 * edge : limit;
     for (const dvec3& neighbour : ring_.neighbours_after) {
-      if (squared(neighbour - placement.position) > longest2) return false;
+      if (squared(neighbour - placement.position) > longest * longest) return false;
     }
     for (size_t i = 0; i < kept_.size(); ++i) {
       if (!is_face_valid(i, placement.position)) return false;
@@ -444,7 +446,8 @@ class Simplifier {
   size_t kept_of_a_ = 0;  ///< the first of kept_ are a's
   std::vector<Spoke> spokes_a_, spokes_b_;
   VertexKind kind_a_{}, kind_b_{};
-  CollapseRing ring_;  ///< its `before` and `after` follow kept_, then collapsing_
+  CollapseRing ring_;         ///< its `before` and `after` follow kept_, then collapsing_
+  double longest_spoke_ = 0;  ///< length of the longest edge at a or b, but for ab
   std::vector<double> area_before_, area_after_;
   std::vector<FaceMaterial> ring_materials_;
 };
