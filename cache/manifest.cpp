@@ -19,9 +19,9 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-constexpr uint64_t kMaxManifestBytes = uint64_t{16} << 20;
+constexpr uint64_t kMaxManifestBytes = uint64_t{4} << 20;
 constexpr size_t kMaxLevels = 64;  // each level halves the resolution: no double has more
-constexpr size_t kMaxHullPoints = 1 << 16;
+constexpr size_t kMaxHullPoints = 1 << 13;
 constexpr uint64_t kMaxBytes = uint64_t{1} << 50;
 constexpr uint64_t kMaxElements = uint64_t{1} << 32;
 constexpr int kMaxDepth = 16;  // of nesting; ours is 4
@@ -35,12 +35,23 @@ bool is_plain_file_name(const std::string& name) {
          std::ranges::none_of(name, forbidden);
 }
 
+/// Text from a file as one short line of a message.
+std::string printable(std::string_view text) {
+  constexpr size_t kLongest = 200;
+  std::string line(text.substr(0, kLongest));
+  std::ranges::replace_if(
+      line, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+  return text.size() > kLongest ? line + "..." : line;
+}
+
 using Problem = std::optional<std::string>;
 
 Problem find_level_problem(const LevelEntry& level) {
   if (level.level >= kMaxLevels) return fmt::format("level numbers end at {}", kMaxLevels - 1);
   if (!std::isfinite(level.resolution) || !(level.resolution > 0)) return "its resolution is not positive";
-  if (!is_plain_file_name(level.file)) return fmt::format("\"{}\" is not a file name inside the folder", level.file);
+  if (!is_plain_file_name(level.file)) {
+    return fmt::format("\"{}\" is not a file name inside the folder", printable(level.file));
+  }
   for (const uint64_t bytes : {level.file_bytes, level.resident_bytes, level.build_peak_bytes}) {
     if (bytes > kMaxBytes) return fmt::format("{} bytes are more than any level has", bytes);
   }
@@ -87,6 +98,22 @@ Problem find_problem(const Manifest& manifest) {
 }
 
 // ---- JSON to values ----
+
+/// How deep the brackets of a JSON text nest. The parser itself does not recurse, but it takes a hundred bytes of
+/// memory for each bracket.
+int nesting_depth(std::string_view text) {
+  int depth = 0, deepest = 0;
+  bool in_string = false;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (in_string && c == '\\') ++i;  // the next character is escaped
+    if (c == '"') in_string = !in_string;
+    if (in_string) continue;
+    if (c == '[' || c == '{') deepest = std::max(deepest, ++depth);
+    if (c == ']' || c == '}') --depth;
+  }
+  return deepest;
+}
 
 /// Reads fields and remembers the first thing that is wrong, so that the reading code states no errors itself.
 class FieldReader {
@@ -266,16 +293,12 @@ Result<Manifest> manifest_from_json(std::string_view text, std::string_view name
   const auto broken = [&](std::string_view problem) {
     return make_error(ErrorCode::BadFile, fmt::format("broken manifest {}: {}; bake the asset again", name, problem));
   };
+  if (nesting_depth(text) > kMaxDepth) return broken(fmt::format("it is nested deeper than {}", kMaxDepth));
   Json json;
   try {
-    bool too_deep = false;
-    json = Json::parse(text, [&](int depth, Json::parse_event_t, Json&) {
-      too_deep |= depth > kMaxDepth;
-      return depth <= kMaxDepth;
-    });
-    if (too_deep) return broken(fmt::format("it is nested deeper than {}", kMaxDepth));
+    json = Json::parse(text);
   } catch (const Json::exception& error) {  // the only way to learn where the syntax is wrong
-    return broken(error.what());
+    return broken(printable(error.what()));
   }
 
   FieldReader read;
