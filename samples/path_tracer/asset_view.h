@@ -31,7 +31,9 @@ struct ViewOptions {
 /// A view: R, G, B (premultiplied), A.
 struct ViewImages {
   Image mean;
-  Image half[2];  ///< means of the even and of the odd samples: their difference gives the noise
+  /// Means of the even and of the odd samples. Their difference gives the noise, rather too high than too low, because
+  /// a pixel's samples are spread evenly.
+  Image half[2];
 };
 
 /// A baked asset with all rays at one lambda. One thread at a time; render() itself uses all threads.

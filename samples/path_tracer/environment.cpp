@@ -188,9 +188,9 @@ vec3 Environment::radiance(const vec3& wi) const {
   return impl_->background(wi) + (in_disc ? impl_->disc->radiance : vec3(0.0f));
 }
 
-EnvironmentSample Environment::sample(Rng& rng) const {
+EnvironmentSample Environment::sample(float choice, Rng& rng) const {
   EnvironmentSample sample;
-  if (impl_->disc_probability > 0 && rng.next() < impl_->disc_probability) {
+  if (choice < impl_->disc_probability) {
     sample.wi = impl_->disc->sample(rng);
   } else {
     if (!(impl_->cells.integral() > 0)) return sample;

@@ -56,8 +56,10 @@ class Environment {
 
   /// Radiance that arrives from unit direction `wi`.
   vec3 radiance(const vec3& wi) const;
-  /// Draws a direction; black environments give pdf 0.
-  EnvironmentSample sample(Rng& rng) const;
+  /// Draws a direction; black environments give pdf 0. choice: uniform in [0, 1), says whether the sun's disc or the
+  /// rest is drawn from; worth stratifying over a pixel's samples.
+  EnvironmentSample sample(float choice, Rng& rng) const;
+  EnvironmentSample sample(Rng& rng) const { return sample(rng.next(), rng); }
   /// Density with which sample() draws wi, per steradian. Integrates to 1, or is 0 everywhere for black.
   float pdf(const vec3& wi) const;
 

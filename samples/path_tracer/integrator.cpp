@@ -40,7 +40,8 @@ class PathTracer {
   PathTracer(const TraceScene& scene, const TraceOptions& options)
       : scene_(scene), lights_(*scene.lights), options_(options) {}
 
-  FilmSample trace(const CameraRay& camera_ray, uint64_t path_key);
+  /// light_choice: uniform in [0, 1), for the first event's EnvironmentSample.
+  FilmSample trace(const CameraRay& camera_ray, uint64_t path_key, float light_choice);
 
   TraceStats stats;
 
@@ -62,6 +63,7 @@ class PathTracer {
   // Of the path in hand.
   Rng rng_{0};
   uint32_t path_seed_ = 0;
+  float light_choice_ = 0;
   int depth_ = 0;  ///< scattering events so far
   vec3 throughput_{1.0f};
   vec3 color_{0.0f};
@@ -150,7 +152,7 @@ void PathTracer::add_environment(const PathRay& ray) {
 // Next-event estimation of the environment.
 void PathTracer::add_sampled_environment(const Interaction& vertex, const PathRay& incoming) {
   if (options_.strategy == LightStrategy::ScatterRays) return;
-  const EnvironmentSample light = lights_.environment.sample(rng_);
+  const EnvironmentSample light = lights_.environment.sample(depth_ == 1 ? light_choice_ : rng_.next(), rng_);
   if (!(light.pdf > 0)) return;
   const vec3 scattered = vertex.eval(light.wi, rng_);
   if (!(max_component(scattered) > 0)) return;
@@ -189,9 +191,10 @@ bool PathTracer::survives_roulette() {
   return true;
 }
 
-FilmSample PathTracer::trace(const CameraRay& camera_ray, uint64_t path_key) {
+FilmSample PathTracer::trace(const CameraRay& camera_ray, uint64_t path_key, float light_choice) {
   rng_ = Rng(path_key);
   path_seed_ = rng_.next_uint();
+  light_choice_ = light_choice;
   depth_ = 0;
   throughput_ = vec3(1.0f);
   color_ = vec3(0.0f);
@@ -230,6 +233,25 @@ FilmSample PathTracer::trace(const CameraRay& camera_ray, uint64_t path_key) {
   return result;
 }
 
+// The three numbers of a path that matter most, spread evenly over a pixel's samples: its place in the pixel and the
+// light of its first event. A rank-1 lattice with irrational steps, powers of the root of x^4 = x + 1 [Roberts 2018],
+// from a random start per pixel: each number alone is uniform, so nothing is biased.
+class PixelLattice {
+ public:
+  explicit PixelLattice(uint64_t pixel_key) {
+    Rng rng(pixel_key, 1);
+    for (uint32_t& start : start_) start = rng.next_uint();
+  }
+  float value(int sample, int dimension) const {
+    constexpr uint32_t kSteps[3] = {3518319155u, 2882110345u, 2360945575u};  // 2^32 / root^(1, 2, 3)
+    const uint32_t bits = start_[dimension] + static_cast<uint32_t>(sample) * kSteps[dimension];
+    return static_cast<float>(bits >> 8) * 0x1p-24f;
+  }
+
+ private:
+  uint32_t start_[3];
+};
+
 // The pixels of one tile; every path's random numbers follow from the seed, the pixel and the sample alone.
 void trace_tile(PathTracer& tracer, const Camera& camera, const TraceOptions& options, int tile_x, int tile_y,
                 Film& film) {
@@ -238,12 +260,12 @@ void trace_tile(PathTracer& tracer, const Camera& camera, const TraceOptions& op
   for (int y = tile_y * kTileSide; y < y_end; ++y) {
     for (int x = tile_x * kTileSide; x < x_end; ++x) {
       const uint64_t pixel_key = mix64(options.seed, static_cast<uint64_t>(y) * film.width() + x);
+      const PixelLattice lattice(pixel_key);
       PixelSums sums;
       for (int s = 0; s < options.samples_per_pixel; ++s) {
-        const uint64_t path_key = mix64(pixel_key, static_cast<uint64_t>(s));
-        Rng jitter(path_key, 1);
-        const float dx = jitter.next(), dy = jitter.next();
-        sums.add(tracer.trace(camera.ray(static_cast<float>(x) + dx, static_cast<float>(y) + dy), path_key));
+        const CameraRay ray =
+            camera.ray(static_cast<float>(x) + lattice.value(s, 0), static_cast<float>(y) + lattice.value(s, 1));
+        sums.add(tracer.trace(ray, mix64(pixel_key, static_cast<uint64_t>(s)), lattice.value(s, 2)));
       }
       film.set_pixel(x, y, sums);
     }
