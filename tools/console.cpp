@@ -18,6 +18,7 @@ namespace fs = std::filesystem;
 bool stdout_is_terminal() { return isatty(STDOUT_FILENO) == 1; }
 
 void print_warnings(std::string_view command, const std::vector<std::string>& warnings, size_t shown) {
+  if (isatty(STDERR_FILENO) != 1) return;
   for (size_t i = 0; i < std::min(shown, warnings.size()); ++i)
     fmt::print(stderr, "farfield {}: warning: {}\n", command, one_line(warnings[i]));
   if (warnings.size() > shown)

@@ -14,7 +14,8 @@ namespace farfield::tool {
 /// True if a person reads standard output. In a pipe commands print only what they were asked for.
 bool stdout_is_terminal();
 
-/// "farfield bake: warning: ...": each warning on a line of standard error, at most `shown` of them.
+/// "farfield bake: warning: ...": each warning on a line of standard error, at most `shown` of them, if a person reads
+/// there. In a pipe nothing: --report and --json have them all.
 void print_warnings(std::string_view command, const std::vector<std::string>& warnings, size_t shown = 5);
 
 /// The text with line breaks and other control characters made visible, so that it stays one line on the terminal.

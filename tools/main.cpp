@@ -44,8 +44,10 @@ int run(int argc, char** argv) {
 
   const Result<void> result = action();
   if (result) return 0;
-  fmt::print(stderr, "{}: {}\n", name_of_command(app), tool::one_line(result.error().message));
-  return result.error().code == ErrorCode::Cancelled ? kInterrupted : kFailed;
+  const bool is_interrupted = result.error().code == ErrorCode::Cancelled;
+  fmt::print(stderr, "{}: {}\n", name_of_command(app),
+             is_interrupted ? "interrupted" : tool::one_line(result.error().message));
+  return is_interrupted ? kInterrupted : kFailed;
 }
 
 }  // namespace

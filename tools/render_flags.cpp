@@ -21,6 +21,13 @@ Result<Blend> parse_blend(const std::string& text) {
   return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a way to blend; dissolve is", text));
 }
 
+/// What CLI::PositiveNumber says, but NaN is no number either.
+std::string is_scale(const std::string& text) {
+  float scale = 0;
+  if (CLI::detail::lexical_cast(text, scale) && scale > 0 && scale <= 1e6f) return {};
+  return fmt::format("\"{}\" is not a number above 0, at most 1e6", text);
+}
+
 }  // namespace
 
 void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::string& output_help) {
@@ -46,7 +53,7 @@ void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::
   add_parsed_option(command, "--blend", options.blend, parse_blend, "How neighbouring levels are mixed: dissolve")
       ->default_str("dissolve");
   command->add_option("--lod-scale", options.lod_scale, "Multiplies footprints: above 1 coarser and cheaper")
-      ->check(CLI::Range(1e-6, 1e6))
+      ->check(is_scale)
       ->capture_default_str();
   command->add_flag("--full-detail", options.full_detail, "Render the sources, without levels, for comparison");
   command->add_option("--environment", arguments.environment, "Light from a latitude-longitude EXR");

@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "base/bytes.h"
 #include "tools/commands.h"
 #include "tools/console.h"
 #include "tools/flags.h"
@@ -10,7 +13,25 @@
 namespace farfield::tool {
 namespace {
 
-Result<void> run_verify(const std::string& asset) { return make_error(ErrorCode::Io, ""); }
+Result<void> run_verify(const std::string& asset) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(asset, error))
+    return make_error(ErrorCode::NotFound, fmt::format("{}: there is no such folder", asset));
+  const VerifyResult result = verify_asset(asset);
+  for (const Finding& finding : result.findings)
+    fmt::print("{}: {}\n", finding.severity == Finding::Severity::Error ? "error" : "warning",
+               one_line(finding.message));
+  if (!result.is_sound()) {
+    const auto errors = std::count_if(result.findings.begin(), result.findings.end(), [](const Finding& finding) {
+      return finding.severity == Finding::Severity::Error;
+    });
+    return make_error(ErrorCode::BadFile,
+                      fmt::format("{}: broken, {} error{}; bake it again", asset, errors, errors == 1 ? "" : "s"));
+  }
+  if (stdout_is_terminal())
+    fmt::print("{}: sound, {} levels, {} checked\n", asset, result.levels_checked, format_bytes(result.bytes_checked));
+  return {};
+}
 
 }  // namespace
 

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/hash.h"
+#include "cache/level_file.h"
 #include "prefilter/bake.h"
 #include "samples/evaluate/resident_cost.h"
 #include "samples/evaluate/sheet.h"
@@ -62,19 +63,30 @@ struct LevelPlan {
 /// One picture of one view, in independent parts.
 using Parts = std::vector<Image>;
 
-Box3 bounds_in_source_space(const Manifest& manifest) {
-  return {manifest.bounds.lower + vec3(manifest.origin), manifest.bounds.upper + vec3(manifest.origin)};
+Box3 in_source_space(const Box3& bounds, const Manifest& manifest) {
+  return {bounds.lower + vec3(manifest.origin), bounds.upper + vec3(manifest.origin)};
 }
 
-Result<std::vector<LevelPlan>> plan_evaluation(const Manifest& manifest, const Box3& bounds,
+/// What the level's pictures have to show: the level and its source. (The bounds of the whole asset are those of its
+/// root, which may be voxels wider.)
+Result<Box3> bounds_of(const EvaluateOptions& options, const Manifest& manifest, const LevelEntry& entry) {
+  const auto file = LevelFile::open(options.asset / entry.file, LevelCheck::Structure);
+  if (!file) return tl::unexpected(file.error());
+  return in_source_space((*file)->view().header.bounds, manifest);
+}
+
+Result<std::vector<LevelPlan>> plan_evaluation(const Manifest& manifest, const Box3& source_bounds,
                                                const EvaluateOptions& options) {
   constexpr uint64_t kMaxPicture = uint64_t{1} << 26;
   std::vector<LevelPlan> plans;
   for (const LevelEntry& entry : manifest.levels) {
     if (entry.level < options.first_level || entry.level > options.last_level) continue;
+    auto bounds = bounds_of(options, manifest, entry);
+    if (!bounds) return tl::unexpected(bounds.error());
+    bounds->extend(source_bounds);
     LevelPlan plan{entry, {}, 0, 0};
     for (const vec3& direction : view_directions(options.views)) {
-      const OrthoView view = frame_view(bounds, direction, static_cast<float>(entry.resolution));
+      const OrthoView view = frame_view(*bounds, direction, static_cast<float>(entry.resolution));
       const uint64_t pixels = static_cast<uint64_t>(view.width_px) * static_cast<uint64_t>(view.height_px);
       if (pixels > kMaxPicture)
         return make_error(ErrorCode::InvalidArgument,
@@ -289,7 +301,7 @@ Result<void> record_errors(const fs::path& asset, const std::vector<LevelEvaluat
 }  // namespace
 
 int default_samples_per_pixel(uint64_t pixels) {
-  constexpr uint64_t kSamples = 40'000'000;  // per picture and level: docs/error_metric.md has the times
+  constexpr uint64_t kSamples = 16'000'000;  // per picture and level: docs/error_metric.md has the times
   const uint64_t samples = kSamples / std::max<uint64_t>(pixels, 1);
   return static_cast<int>(std::clamp<uint64_t>(samples / kParts * kParts, 8, 4096));
 }
@@ -304,9 +316,7 @@ Result<Evaluation> evaluate(const EvaluateOptions& options) {
   auto source_manifest = bake_source(options, folder->path());
   if (!source_manifest) return tl::unexpected(source_manifest.error());
 
-  Box3 bounds = bounds_in_source_space(*manifest);
-  bounds.extend(bounds_in_source_space(*source_manifest));
-  auto plans = plan_evaluation(*manifest, bounds, options);
+  auto plans = plan_evaluation(*manifest, in_source_space(source_manifest->bounds, *source_manifest), options);
   if (!plans) return tl::unexpected(plans.error());
   auto source = AssetView::open(folder->path(), 0.0f);
   if (!source) return tl::unexpected(source.error());

@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "base/check.h"
+#include "base/parallel.h"
 
 namespace farfield {
 namespace {
@@ -146,8 +147,9 @@ Result<void> ErrorAccumulator::add_view(std::span<const Image> source, std::span
   if (!sums_.empty() && sums_.size() != source.size() + 1)
     return make_error(ErrorCode::InvalidArgument, "every view needs the same number of parts");
   sums_.resize(source.size() + 1);
-  add_subset(source, level, source.size(), sums_[0]);
-  for (size_t part = 0; part < source.size(); ++part) add_subset(source, level, part, sums_[1 + part]);
+  parallel_for(sums_.size(), 1, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) add_subset(source, level, i == 0 ? source.size() : i - 1, sums_[i]);
+  });
   return {};
 }
 

@@ -8,8 +8,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <chrono>
-#include <thread>
 
 namespace farfield {
 namespace {
@@ -26,13 +24,14 @@ namespace {
   _exit(127);
 }
 
-/// Reads both pipes until both are closed.
-void drain(int out, int err, ProcessOutput& output) {
+/// Reads both pipes until both are closed; calls `tick` a few hundred times per second meanwhile.
+void drain(int out, int err, ProcessOutput& output, const std::function<void()>& tick) {
   std::array<pollfd, 2> pipes = {pollfd{out, POLLIN, 0}, pollfd{err, POLLIN, 0}};
   std::array<std::string*, 2> texts = {&output.out, &output.err};
   int open_pipes = 2;
   while (open_pipes > 0) {
-    poll(pipes.data(), pipes.size(), -1);
+    poll(pipes.data(), pipes.size(), 3);
+    tick();
     for (size_t i = 0; i < pipes.size(); ++i) {
       if (pipes[i].fd < 0 || pipes[i].revents == 0) continue;
       std::array<char, 4096> buffer;
@@ -50,22 +49,21 @@ void drain(int out, int err, ProcessOutput& output) {
 
 }  // namespace
 
-ProcessOutput run_process(const std::vector<std::string>& arguments, int interrupt_after_ms) {
+ProcessOutput run_process(const std::vector<std::string>& arguments, const std::function<bool()>& interrupt_when) {
   std::array<int, 2> out, err;
   if (pipe2(out.data(), O_CLOEXEC) != 0 || pipe2(err.data(), O_CLOEXEC) != 0) return {};
   const pid_t child = fork();
   if (child == 0) execute(arguments, out[1], err[1]);
   close(out[1]);
   close(err[1]);
-  std::thread interrupter;
-  if (interrupt_after_ms > 0)
-    interrupter = std::thread([=] {
-      std::this_thread::sleep_for(std::chrono::milliseconds(interrupt_after_ms));
-      kill(child, SIGINT);  // the child is not waited for yet, so the id is still its own
-    });
+  bool is_interrupted = false;
+  const auto tick = [&] {
+    if (is_interrupted || !interrupt_when || !interrupt_when()) return;
+    kill(child, SIGINT);  // the child is not waited for yet, so the id is still its own
+    is_interrupted = true;
+  };
   ProcessOutput output;
-  drain(out[0], err[0], output);
-  if (interrupter.joinable()) interrupter.join();
+  drain(out[0], err[0], output, tick);
   int status = 0;
   waitpid(child, &status, 0);
   output.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

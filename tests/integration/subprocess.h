@@ -2,6 +2,7 @@
 // Runs a program and catches all it says.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -12,7 +13,8 @@ struct ProcessOutput {
   std::string out, err;
 };
 
-/// Runs `arguments[0]` with both outputs into pipes and no input. interrupt_after_ms > 0: sends SIGINT then.
-ProcessOutput run_process(const std::vector<std::string>& arguments, int interrupt_after_ms = 0);
+/// Runs `arguments[0]` with both outputs into pipes and no input. Once `interrupt_when` (polled, may be empty) says so,
+/// the process gets one SIGINT.
+ProcessOutput run_process(const std::vector<std::string>& arguments, const std::function<bool()>& interrupt_when = {});
 
 }  // namespace farfield

@@ -12,7 +12,7 @@ namespace {
 namespace fs = std::filesystem;
 
 fs::path fresh_folder(const char* name) {
-  const fs::path folder = fs::path(testing::TempDir()) / "farfield_console_test" / name;
+  const fs::path folder = fs::path(testing::TempDir()) / "farfield_console_test" / name;  // names differ per test
   fs::remove_all(folder);
   fs::create_directories(folder);
   return folder;

@@ -1,0 +1,395 @@
+// SPDX-License-Identifier: Apache-2.0
+// The `farfield` command as people and scripts use it: help, errors, the whole road on a small asset, Ctrl-C.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "small_assets.h"
+#include "subprocess.h"
+
+namespace farfield {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+ProcessOutput farfield(std::vector<std::string> arguments, const std::function<bool()>& interrupt_when = {}) {
+  arguments.insert(arguments.begin(), FARFIELD_TOOL);
+  return run_process(arguments, interrupt_when);
+}
+
+/// The folder of this process: ctest runs every test in its own, several at once.
+fs::path test_folder() { return fs::path(testing::TempDir()) / ("farfield_cli_test_" + std::to_string(getpid())); }
+
+fs::path fresh_folder(const std::string& name) {
+  const fs::path folder = test_folder() / name;
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  return folder;
+}
+
+/// Keeps the evidence of a failure, removes the rest.
+class CleanUp : public testing::Environment {
+  void TearDown() override {
+    std::error_code ignored;
+    if (!testing::UnitTest::GetInstance()->Failed()) fs::remove_all(test_folder(), ignored);
+  }
+};
+const auto* const kCleanUp = testing::AddGlobalTestEnvironment(new CleanUp);
+
+std::string contents(const fs::path& path) {
+  std::stringstream text;
+  text << std::ifstream(path, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+void write(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+
+/// Failed, with exactly one line on standard error that names the command and has `part`, and nothing else said.
+void expect_one_line_error(const ProcessOutput& output, const std::string& part) {
+  EXPECT_NE(output.exit_code, 0);
+  EXPECT_LT(output.exit_code, 128) << "killed by a signal";
+  EXPECT_EQ(output.out, "");
+  EXPECT_EQ(std::count(output.err.begin(), output.err.end(), '\n'), 1) << output.err;
+  EXPECT_EQ(output.err.rfind("farfield", 0), 0u) << output.err;
+  EXPECT_NE(output.err.find(part), std::string::npos) << output.err << "lacks: " << part;
+}
+
+void expect_quiet_success(const ProcessOutput& output) {
+  EXPECT_EQ(output.exit_code, 0);
+  EXPECT_EQ(output.out, "");
+  EXPECT_EQ(output.err, "");
+}
+
+const std::vector<std::string> kCommands = {"bake", "info", "verify", "evaluate", "render", "shot"};
+
+TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
+  const std::vector<std::vector<std::string>> flags = {
+      {"--output", "--finest-grid", "--coarsest-grid", "--threads", "--report", "--mesh", "--source-only"},
+      {"--json"},
+      {},
+      {"--source", "--levels", "--views", "--spp", "--json", "--sheet", "--images"},
+      {"--frame", "--size", "--spp", "--budget", "--assets", "--blend", "--lod-scale", "--full-detail", "--output"},
+      {"--frames", "--size", "--spp", "--budget", "--assets", "--blend", "--lod-scale", "--full-detail", "--output"}};
+  for (size_t i = 0; i < kCommands.size(); ++i) {
+    const ProcessOutput help = farfield({kCommands[i], "--help"});
+    EXPECT_EQ(help.exit_code, 0) << kCommands[i];
+    EXPECT_EQ(help.err, "");
+    EXPECT_NE(help.out.find("Example:\n  farfield " + kCommands[i]), std::string::npos) << help.out;
+    for (const std::string& flag : flags[i]) EXPECT_NE(help.out.find(flag), std::string::npos) << flag;
+  }
+}
+
+TEST(Help, OfTheToolListsTheCommands) {
+  const ProcessOutput help = farfield({"--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  for (const std::string& command : kCommands) EXPECT_NE(help.out.find("  " + command + " "), std::string::npos);
+  EXPECT_EQ(farfield({"--version"}).out.rfind("farfield ", 0), 0u);
+}
+
+TEST(Usage, NonsenseIsOneLineThatPointsToTheHelp) {
+  const std::vector<std::vector<std::string>> nonsense = {
+      {},
+      {"frobnicate"},
+      {"--frobnicate"},
+      {"bake"},
+      {"bake", "a.obj"},
+      {"bake", "a.obj", "-o"},
+      {"bake", "a.obj", "-o", "b", "--frobnicate"},
+      {"bake", "a.obj", "-o", "b", "--finest-grid", "many"},
+      {"bake", "a.obj", "-o", "b", "--finest-grid", "-8"},
+      {"bake", "a.obj", "-o", "b", "--threads", "-1"},
+      {"bake", "a.obj", "-o", "b", "--mesh", "-2"},
+      {"bake", "a.obj", "-o", "b", "c"},
+      {"info"},
+      {"info", "a", "b"},
+      {"verify"},
+      {"evaluate", "a"},
+      {"evaluate", "a", "--source", "b", "--levels", "5-2"},
+      {"evaluate", "a", "--source", "b", "--views", "0"},
+      {"evaluate", "a", "--source", "b", "--spp", "0"},
+      {"render", "a.glb"},
+      {"render", "a.glb", "-o", "b.exr", "--size", "640"},
+      {"render", "a.glb", "-o", "b.exr", "--size", "0x0"},
+      {"render", "a.glb", "-o", "b.exr", "--budget", "lots"},
+      {"render", "a.glb", "-o", "b.exr", "--budget", "-4G"},
+      {"render", "a.glb", "-o", "b.exr", "--blend", "stir"},
+      {"render", "a.glb", "-o", "b.exr", "--lod-scale", "0"},
+      {"render", "a.glb", "-o", "b.exr", "--lod-scale", "nan"},
+      {"render", "a.glb", "-o", "b.exr", "--frame", "-1"},
+      {"render", "a.glb", "-o", "b.exr", "--spp", "0"},
+      {"shot", "a.glb", "-o", "b"},
+      {"shot", "a.glb", "-o", "b", "--frames", "9-1"},
+      {"shot", "a.glb", "-o", "b", "--frames", "0-9:0"},
+      {"shot", "a.glb", "-o", "b", "--frames", ""},
+  };
+  for (const auto& arguments : nonsense) {
+    std::string line;
+    for (const std::string& argument : arguments) line += argument + " ";
+    SCOPED_TRACE(line);
+    expect_one_line_error(farfield(arguments), "--help");
+  }
+}
+
+/// Files that are not what they should be.
+class BadInput : public testing::Test {
+ protected:
+  const fs::path folder = fresh_folder("bad_input");
+  const std::string bush = (folder / "bush.obj").string();
+
+  void SetUp() override { write_bush_obj(bush, 20); }
+  std::string path(const std::string& name) const { return (folder / name).string(); }
+};
+
+TEST_F(BadInput, MissingFilesAreNamed) {
+  expect_one_line_error(farfield({"bake", path("no.obj"), "-o", path("out.farfield")}), path("no.obj"));
+  expect_one_line_error(farfield({"info", path("no.farfield")}), path("no.farfield"));
+  expect_one_line_error(farfield({"verify", path("no.farfield")}), path("no.farfield"));
+  expect_one_line_error(farfield({"evaluate", path("no.farfield"), "--source", bush}), path("no.farfield"));
+  expect_one_line_error(farfield({"render", path("no.glb"), "-o", path("a.exr")}), path("no.glb"));
+  expect_one_line_error(farfield({"shot", path("no.glb"), "--frames", "0-1", "-o", path("shot")}), path("no.glb"));
+  EXPECT_FALSE(fs::exists(path("out.farfield") + "/manifest.json"));
+}
+
+TEST_F(BadInput, BrokenFilesAreNamed) {
+  const std::string noise = std::string("\x00\xff\x7f{]", 5) + std::string(1000, '\x80');
+  for (const char* name : {"broken.obj", "broken.ply", "broken.glb", "broken.gltf", "broken.obj.gz", "broken.txt"}) {
+    write(path(name), noise);
+    expect_one_line_error(farfield({"bake", path(name), "-o", path("out.farfield")}), name);
+  }
+  expect_one_line_error(farfield({"render", path("broken.glb"), "-o", path("a.exr")}), "broken.glb");
+  write(path("empty.obj"), "");
+  expect_one_line_error(farfield({"bake", path("empty.obj"), "-o", path("out.farfield")}), "empty.obj");
+}
+
+TEST_F(BadInput, HostileManifestsAreRefusedAndNeverCrash) {
+  const fs::path asset = folder / "hostile.farfield";
+  fs::create_directories(asset);
+  for (const std::string& manifest :
+       {std::string(), std::string("{}"), std::string("[]"), std::string("nul"), std::string(100000, '['),
+        std::string(R"({"version": 1})"), std::string(R"({"version": 999999999999999999999})"),
+        std::string(R"({"version": 1, "levels": [{"file": "../../etc/passwd", "level": 0}]})"),
+        std::string(1000, '\0')}) {
+    write(asset / "manifest.json", manifest);
+    expect_one_line_error(farfield({"info", asset.string()}), "hostile.farfield");
+    const ProcessOutput verified = farfield({"verify", asset.string()});
+    EXPECT_EQ(verified.exit_code, 1);
+    EXPECT_EQ(std::count(verified.err.begin(), verified.err.end(), '\n'), 1) << verified.err;
+  }
+  fs::remove(asset / "manifest.json");
+  fs::create_directories(asset / "manifest.json");  // a folder where a file should be
+  expect_one_line_error(farfield({"info", asset.string()}), "hostile.farfield");
+}
+
+TEST_F(BadInput, UnwritableOutputIsNamedBeforeAnyWorkIsDone) {
+  const std::string report = path("missing/report.json");
+  expect_one_line_error(farfield({"bake", bush, "-o", path("out.farfield"), "--report", report}), report);
+  EXPECT_FALSE(fs::exists(path("out.farfield")));
+  expect_one_line_error(farfield({"bake", bush, "-o", bush}), "bush.obj");
+  expect_one_line_error(farfield({"bake", bush, "-o", "/proc/nothing/out.farfield"}), "/proc/nothing");
+  expect_one_line_error(farfield({"evaluate", path("a"), "--source", bush, "--sheet", path("no/a.png")}), "no/a.png");
+  expect_one_line_error(farfield({"render", path("a.glb"), "-o", path("no/a.exr")}), "no/a.exr");
+  expect_one_line_error(farfield({"render", path("a.glb"), "-o", "/dev/null"}), "/dev/null");
+}
+
+TEST_F(BadInput, GridsThatCannotBeAreRefused) {
+  for (const auto& [finest, coarsest] : {std::pair("100", "8"), std::pair("8", "64"), std::pair("0", "0")})
+    expect_one_line_error(
+        farfield({"bake", bush, "-o", path("out.farfield"), "--finest-grid", finest, "--coarsest-grid", coarsest}),
+        "grid");
+}
+
+TEST_F(BadInput, ABudgetThatCannotDoSaysWhatWould) {
+  write_bush_scene(path("scene.gltf"), 60);
+  const ProcessOutput output = farfield({"render", path("scene.gltf"), "--size", "8x8", "--spp", "1", "--budget", "1K",
+                                         "--finest-grid", "16", "--assets", path("assets"), "-o", path("a.exr")});
+  expect_one_line_error(output, "budget");
+}
+
+/// One bake that several tests look at.
+class WholeRoad : public testing::Test {
+ protected:
+  static inline fs::path folder;
+  static inline std::string bush, asset;
+
+  static void SetUpTestSuite() {
+    folder = fresh_folder("whole_road");
+    bush = (folder / "bush.obj").string();
+    asset = (folder / "bush.farfield").string();
+    write_bush_obj(bush, 300);
+    const ProcessOutput baked =
+        farfield({"bake", bush, "-o", asset, "--finest-grid", "32", "--report", path("bake.json")});
+    expect_quiet_success(baked);
+  }
+  static std::string path(const std::string& name) { return (folder / name).string(); }
+};
+
+TEST_F(WholeRoad, TheReportHasEveryLevel) {
+  const Json report = Json::parse(contents(path("bake.json")));
+  EXPECT_EQ(report["source"], "bush.obj");
+  EXPECT_GT(report["total_seconds"], 0.0);
+  EXPECT_GE(report["levels"].size(), 3u);
+  EXPECT_TRUE(report["warnings"].is_array());
+}
+
+TEST_F(WholeRoad, BakingAgainDoesNothing) {
+  expect_quiet_success(farfield({"bake", bush, "-o", asset, "--finest-grid", "32", "--report", path("again.json")}));
+  EXPECT_EQ(Json::parse(contents(path("again.json")))["up_to_date"], true);
+}
+
+TEST_F(WholeRoad, InfoShowsEveryLevel) {
+  const ProcessOutput table = farfield({"info", asset});
+  EXPECT_EQ(table.exit_code, 0);
+  EXPECT_EQ(table.err, "");
+  EXPECT_NE(table.out.find("16^3"), std::string::npos) << table.out;
+  const ProcessOutput text = farfield({"info", asset, "--json"});
+  const Json info = Json::parse(text.out);
+  ASSERT_GE(info["levels"].size(), 3u);
+  EXPECT_EQ(info["levels"][0]["level"], 0);
+  EXPECT_EQ(info["levels"].back()["grid"], 8);
+  for (const Json& level : info["levels"]) {
+    EXPECT_GT(level["bytes_disk"], 0);
+    EXPECT_GT(level["bytes_resident"], 0);
+    EXPECT_GT(level["triangles"].get<int>() + level["voxels"].get<int>(), 0);
+  }
+}
+
+TEST_F(WholeRoad, VerifyAcceptsTheAssetAndFindsABrokenByteInEveryLevel) {
+  const ProcessOutput good = farfield({"verify", asset});
+  EXPECT_EQ(good.exit_code, 0);
+  EXPECT_EQ(good.err, "");
+  for (const Json& level : Json::parse(farfield({"info", asset, "--json"}).out)["levels"]) {
+    const fs::path broken = folder / "broken.farfield", file = broken / level["file"].get<std::string>();
+    fs::remove_all(broken);
+    fs::copy(asset, broken, fs::copy_options::recursive);
+    std::string bytes = contents(file);
+    bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 0x10);
+    write(file, bytes);
+    const ProcessOutput bad = farfield({"verify", broken.string()});
+    EXPECT_EQ(bad.exit_code, 1);
+    EXPECT_NE(bad.out.find(file.filename().string()), std::string::npos) << bad.out;
+    EXPECT_EQ(std::count(bad.err.begin(), bad.err.end(), '\n'), 1) << bad.err;
+  }
+}
+
+TEST_F(WholeRoad, EvaluateMeasuresWritesPicturesAndRecordsErrors) {
+  expect_quiet_success(farfield({"evaluate", asset, "--source", bush, "--levels", "1-9", "--views", "2", "--spp", "16",
+                                 "--json", path("e.json"), "--sheet", path("e.png"), "--images", path("images")}));
+  const Json evaluation = Json::parse(contents(path("e.json")));
+  ASSERT_GE(evaluation["levels"].size(), 2u);
+  for (const Json& level : evaluation["levels"]) {
+    for (const char* key : {"level", "grid", "resolution", "occlusion_error", "occlusion_rms", "color_error",
+                            "color_bias", "triangles", "voxels", "bytes_disk", "bytes_resident"})
+      EXPECT_TRUE(level.contains(key)) << key;
+    EXPECT_EQ(level["color_bias"].size(), 3u);
+    // A bound on nonsense, not on quality: nothing is missing, nothing is twice as large, nothing is black.
+    EXPECT_LT(std::abs(level["occlusion_error"].get<double>()), 0.3) << level;
+    EXPECT_LT(level["color_error"].get<double>(), 0.6) << level;
+    for (const Json& bias : level["color_bias"]) EXPECT_LT(std::abs(bias.get<double>()), 0.5) << level;
+  }
+  const auto pictures = std::distance(fs::directory_iterator(path("images")), {});
+  EXPECT_EQ(static_cast<size_t>(pictures), evaluation["levels"].size() * 2 * 2 + 1);
+  EXPECT_TRUE(fs::exists(path("images/level_03_view_01_source.exr")));
+  EXPECT_GT(fs::file_size(path("e.png")), 1000u);
+
+  const Json info = Json::parse(farfield({"info", asset, "--json"}).out);
+  EXPECT_EQ(info["levels"][1]["color_error"], evaluation["levels"][0]["color_error"]);  // [0] is the source
+}
+
+TEST_F(WholeRoad, EvaluateGivesTheSameFiguresForAnyNumberOfThreads) {
+  std::vector<Json> levels;
+  for (const char* threads : {"1", "3"}) {
+    expect_quiet_success(farfield({"evaluate", asset, "--source", bush, "--levels", "2", "--views", "1", "--spp", "8",
+                                   "--threads", threads, "--json", path("t.json")}));
+    levels.push_back(Json::parse(contents(path("t.json")))["levels"]);
+    for (Json& level : levels.back()) level.erase("seconds");
+  }
+  EXPECT_EQ(levels[0], levels[1]);
+}
+
+TEST_F(WholeRoad, EvaluateWarnsWhenTheSourceIsAnother) {
+  write_bush_obj(path("other.obj"), 200);
+  const ProcessOutput output = farfield({"evaluate", asset, "--source", path("other.obj"), "--levels", "3", "--views",
+                                         "1", "--spp", "4", "--json", path("other.json")});
+  expect_quiet_success(output);
+  EXPECT_EQ(Json::parse(contents(path("other.json")))["warnings"].size(), 1u);
+}
+
+TEST_F(WholeRoad, EvaluateRefusesLevelsThatAreNotThere) {
+  expect_one_line_error(farfield({"evaluate", asset, "--source", bush, "--levels", "900"}), "900");
+}
+
+TEST_F(WholeRoad, RenderAndShotOfAScene) {
+  write_bush_scene(path("scene.gltf"), 120);
+  const std::vector<std::string> common = {"--size", "48x32",    "--spp",        "4",        "--finest-grid",
+                                           "32",     "--assets", path("assets"), "--budget", "64M"};
+  std::vector<std::string> render = {"render", path("scene.gltf"), "--frame", "12", "-o", path("frame.exr")};
+  render.insert(render.end(), common.begin(), common.end());
+  expect_quiet_success(farfield(render));
+  EXPECT_GT(fs::file_size(path("frame.exr")), 1000u);
+  EXPECT_TRUE(fs::exists(path("frame.png")));
+
+  std::vector<std::string> shot = {"shot", path("scene.gltf"), "--frames", "0-24:8", "-o", path("shot")};
+  shot.insert(shot.end(), common.begin(), common.end());
+  expect_quiet_success(farfield(shot));
+  const Json report = Json::parse(contents(path("shot/shot.json")));
+  for (const char* key : {"budget_bytes", "baseline_rss_bytes", "peak_rss_bytes", "peak_accounted_bytes", "frames"})
+    EXPECT_TRUE(report.contains(key)) << key;
+  ASSERT_EQ(report["frames"].size(), 4u);
+  for (const Json& frame : report["frames"])
+    for (const char* key : {"frame", "seconds", "load_seconds", "accounted_bytes", "bias"})
+      EXPECT_TRUE(frame.contains(key)) << key;
+  EXPECT_LE(report["peak_accounted_bytes"], report["budget_bytes"]);
+
+  render.insert(render.end(), {"--full-detail"});
+  expect_quiet_success(farfield(render));
+}
+
+TEST(Interrupt, ABakeStopsInOrderAndGoesOnLater) {
+  const fs::path folder = fresh_folder("interrupt_bake");
+  const std::string bush = (folder / "bush.obj").string(), asset = (folder / "bush.farfield").string();
+  write_bush_obj(bush, 5000);
+  const std::vector<std::string> bake = {"bake", bush, "-o", asset, "--finest-grid", "64"};
+  // As soon as its working folder is there: the source has been read, no level is done.
+  const auto has_started = [&] { return fs::exists(asset + ".partial"); };
+  const ProcessOutput interrupted = farfield(bake, has_started);
+  EXPECT_EQ(interrupted.exit_code, 130);
+  EXPECT_EQ(std::count(interrupted.err.begin(), interrupted.err.end(), '\n'), 1) << interrupted.err;
+  EXPECT_FALSE(fs::exists(asset));
+  expect_quiet_success(farfield(bake));
+  EXPECT_FALSE(fs::exists(asset + ".partial"));
+  EXPECT_EQ(farfield({"verify", asset}).exit_code, 0);
+}
+
+TEST(Interrupt, AShotKeepsItsFrames) {
+  const fs::path folder = fresh_folder("interrupt_shot");
+  write_bush_scene(folder / "scene.gltf", 60);
+  const std::vector<std::string> shot = {"shot",
+                                         (folder / "scene.gltf").string(),
+                                         "--frames",
+                                         "0-2000",
+                                         "--size",
+                                         "32x24",
+                                         "--spp",
+                                         "4",
+                                         "--finest-grid",
+                                         "16",
+                                         "--assets",
+                                         (folder / "assets").string(),
+                                         "-o",
+                                         (folder / "shot").string()};
+  const auto has_frame = [&] { return fs::exists(folder / "shot/frame_0001.exr"); };
+  const ProcessOutput interrupted = farfield(shot, has_frame);
+  EXPECT_EQ(interrupted.exit_code, 130);
+  EXPECT_EQ(std::count(interrupted.err.begin(), interrupted.err.end(), '\n'), 1) << interrupted.err;
+  EXPECT_TRUE(fs::exists(folder / "shot/frame_0000.exr"));
+  EXPECT_GE(Json::parse(contents(folder / "shot/shot.json"))["frames"].size(), 1u);
+}
+
+}  // namespace
+}  // namespace farfield
