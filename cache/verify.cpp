@@ -11,7 +11,6 @@
 
 #include "base/hash.h"
 #include "cache/level_file.h"
-#include "cache/level_format.h"
 #include "cache/manifest.h"
 
 namespace farfield {
@@ -103,15 +102,13 @@ class Verifier {
     }
   }
 
-  /// The planner trusts this figure: at least the sections that rays read must be in it.
+  /// The planner trusts this figure: at least the pages that rays read must be in it.
   void check_resident_bytes(const LevelEntry& entry, const LevelView& level) {
-    uint64_t least = 0;
-    for_each_section(level, [&](SectionId id, const auto& array) {
-      if (id != SectionId::Positions && id != SectionId::Quads) least += array.size_bytes();
-    });
+    const LevelFileSizes sizes = level_file_sizes(level);
+    const uint64_t least = sizes.mapped_bytes - sizes.build_only_bytes;
     if (entry.resident_bytes >= least) return;
-    error(fmt::format("{}: the manifest counts {} resident bytes, and its arrays alone have {}; bake the asset again",
-                      file_, entry.resident_bytes, least));
+    error(fmt::format("{}: the manifest counts {} resident bytes, but rays alone touch {}; bake the asset again", file_,
+                      entry.resident_bytes, least));
   }
 
   void check_bounds(const LevelView& level) {
