@@ -48,116 +48,185 @@ float diffuse_density(const CholeskyFactor<float>& b, const vec3& wo, const vec3
 
 }  // namespace
 
-FlakePhase::FlakePhase(const FlakeParams& params, const vec3& wo) : wo_(wo) {
+template <unsigned kChannels>
+FlakeModel<kChannels>::FlakeModel(const FlakeParams& params, const vec3& wo) : wo_(wo) {
   const SymMat3 s = usable_sggx(params.sggx);
   flakes_ = cholesky(s);
-  diffuse_ = clamp_albedo(params.diffuse);
-  transmission_ = clamp_albedo(params.transmission);
-  specular_ = clamp_albedo(params.specular);
-  const vec3 excess = glm::max(vec3(1.0f), diffuse_ + transmission_);
-  diffuse_ /= excess, transmission_ /= excess;
-  multiple_ = diffuse_ + transmission_;
-  self_shadowing_ = params.self_shadowing >= 0 ? std::min(params.self_shadowing, 1.0f) : 1.0f;
-
-  chances_.diffuse = max_component(diffuse_);
-  chances_.transmission = max_component(transmission_);
-  f90_ = grazing_reflectance(specular_);
-  if (f90_ > 0) {
-    const float roughness2 = params.roughness2 < 1.0f ? std::max(params.roughness2, 0.0f) : 1.0f;
-    // sigma^2 / sigma'^2 = 1 / ((1 - r) + r tr(S) / sigma^2) is largest where sigma^2 is lambda_max.
-    const float largest = static_cast<float>(eigenvalues(s).x);
-    const float scale = 1.0f / ((1.0f - roughness2) + roughness2 * s.trace() / largest);
-    specular_flakes_ = cholesky(specular_sggx(s, roughness2) * scale);
-
-    const vec3 mean = mean_schlick(specular_, f90_);
-    const vec3 rest = glm::max(vec3(1e-6f), vec3(1.0f) - mean);
-    multiple_ = mean + (vec3(1.0f) - mean) * multiple_;
-    chances_.specular = max_component(mean);
-    chances_.diffuse *= 1 - min_component(mean);
-    chances_.transmission *= 1 - min_component(mean);
-    diffuse_ /= rest, transmission_ /= rest;
+  if constexpr (kHasDiffuse) diffuse_ = clamp_albedo(params.diffuse), chances_.diffuse = max_component(diffuse_);
+  if constexpr (kHasTransmission) {
+    transmission_ = clamp_albedo(params.transmission), chances_.transmission = max_component(transmission_);
   }
-  if (self_shadowing_ < 1) {
-    const dvec3 l = eigenvalues(s);
-    multiple_norm_ = static_cast<float>(1 / (4 * kPiOf<double> * carlson_rg(l.x, l.y, l.z)));
-    chances_.multiple = max_component(multiple_);
+  if constexpr (kHasDiffuse && kHasTransmission) {
+    const vec3 excess = glm::max(vec3(1.0f), diffuse_ + transmission_);
+    diffuse_ /= excess, transmission_ /= excess;
   }
+  vec3 mean_fresnel(0.0f);
+  if constexpr (kHasSpecular) mean_fresnel = couple_to_specular(params, s);
+  if constexpr (kHasMultiple) set_up_multiple(params, s, mean_fresnel);
 
   const float single = chances_.specular + chances_.diffuse + chances_.transmission;
-  const float share = single > 0 ? self_shadowing_ / single : 0.0f;
+  const float share = single > 0 ? single_share() / single : 0.0f;
   chances_.specular *= share, chances_.diffuse *= share, chances_.transmission *= share;
-  chances_.multiple = chances_.multiple > 0 ? 1.0f - self_shadowing_ : 0.0f;
 }
 
-// F D'(h) g(wi) / (4 sigma'(wo)).
-vec3 FlakePhase::specular_value(const vec3& wi) const {
-  const BasicSggx<float> sggx(specular_flakes_);
-  const vec3 h = half_vector(wo_, wi);
-  return schlick(specular_, f90_, glm::dot(h, wo_)) * (sggx.specular_phase(wo_, wi) * specular_masking(wi));
+// Sets up the specular flakes and takes from the others what they reflect; returns their mean reflectance.
+template <unsigned kChannels>
+vec3 FlakeModel<kChannels>::couple_to_specular(const FlakeParams& params, const SymMat3& s) requires(kHasSpecular) {
+  const vec3 f0 = clamp_albedo(params.specular);
+  const float f90 = grazing_reflectance(f0);
+  if (!(f90 > 0)) return vec3(0.0f);
+  const float roughness2 = params.roughness2 < 1.0f ? std::max(params.roughness2, 0.0f) : 1.0f;
+  // sigma^2 / sigma'^2 = 1 / ((1 - r) + r tr(S) / sigma^2) is largest where sigma^2 is lambda_max.
+  const float largest = static_cast<float>(eigenvalues(s).x);
+  const float scale = 1.0f / ((1.0f - roughness2) + roughness2 * s.trace() / largest);
+  specular_ = {cholesky(specular_sggx(s, roughness2) * scale), f0, f90};
+
+  const vec3 mean = mean_schlick(f0, f90);
+  const vec3 left = glm::max(vec3(1e-6f), vec3(1.0f) - mean);
+  chances_.specular = max_component(mean);
+  chances_.diffuse *= max_component(left), chances_.transmission *= max_component(left);
+  if constexpr (kHasDiffuse) diffuse_ /= left;
+  if constexpr (kHasTransmission) transmission_ /= left;
+  return mean;
 }
 
-float FlakePhase::specular_masking(const vec3& wi) const {
-  return std::min(1.0f, Sggx(flakes_).sigma(wi) / Sggx(specular_flakes_).sigma(wi));
+// The diffuse albedos are those of flakes already divided by 1 - mean F.
+template <unsigned kChannels>
+void FlakeModel<kChannels>::set_up_multiple(const FlakeParams& params, const SymMat3& s,
+                                            const vec3& mean_fresnel) requires(kHasMultiple) {
+  if (!(params.self_shadowing < 1)) return;
+  const vec3 left = glm::max(vec3(1e-6f), vec3(1.0f) - mean_fresnel);
+  multiple_.albedo = mean_fresnel + left * left * (base_albedo(false) + base_albedo(true));
+  if (!(max_component(multiple_.albedo) > 0)) return;
+  const dvec3 l = eigenvalues(s);
+  multiple_.norm = static_cast<float>(1 / (4 * kPiOf<double> * carlson_rg(l.x, l.y, l.z)));
+  multiple_.share = 1.0f - std::max(params.self_shadowing, 0.0f);
+  chances_.multiple = multiple_.share;
 }
 
-// What couples the diffuse base to the specular lobe, c(wo) c(wi); the albedos hold 1 / (1 - mean F) already.
-vec3 FlakePhase::base_value(const vec3& flake, float cos_i) const {
-  if (!(f90_ > 0)) return vec3(1.0f);
-  const vec3 out = vec3(1.0f) - schlick(specular_, f90_, glm::dot(flake, wo_));
-  const vec3 in = vec3(1.0f) - schlick(specular_, f90_, cos_i);
-  return out * in;
+template <unsigned kChannels>
+float FlakeModel<kChannels>::single_share() const {
+  if constexpr (kHasMultiple) return 1.0f - multiple_.share;
+  return 1.0f;
 }
 
-vec3 FlakePhase::eval(const vec3& wi, Rng& rng) const {
-  vec3 single(0.0f);
-  if (chances_.specular > 0) single += specular_value(wi);
-  if (chances_.diffuse + chances_.transmission > 0) {
-    const vec3 flake = Sggx(flakes_).sample_visible(wo_, rng.next(), rng.next());
-    const float c = glm::dot(flake, wi);
-    const float cos_i = std::abs(c);
-    single += (c > 0 ? diffuse_ : transmission_) * base_value(flake, cos_i) * (cos_i * kInvPi);
+template <unsigned kChannels>
+vec3 FlakeModel<kChannels>::base_albedo(bool through) const {
+  if (through) {
+    if constexpr (kHasTransmission) return transmission_;
+  } else {
+    if constexpr (kHasDiffuse) return diffuse_;
   }
-  vec3 value = self_shadowing_ * single;
-  if (chances_.multiple > 0) value += (1 - self_shadowing_) * multiple_norm_ * Sggx(flakes_).sigma(wi) * multiple_;
+  return vec3(0.0f);
+}
+
+// g(wi): what makes the specular lobe reciprocal.
+template <unsigned kChannels>
+float FlakeModel<kChannels>::masking(const vec3& wi) const requires(kHasSpecular) {
+  return std::min(1.0f, Sggx(flakes_).sigma(wi) / Sggx(specular_.flakes).sigma(wi));
+}
+
+// c(wo) c(wi) of one flake, but for 1 / (1 - mean F), which the albedos hold.
+template <unsigned kChannels>
+vec3 FlakeModel<kChannels>::coupling([[maybe_unused]] const vec3& flake, [[maybe_unused]] float cos_i) const {
+  if constexpr (kHasSpecular) {
+    if (specular_.f90 > 0) {
+      const vec3 out = vec3(1.0f) - schlick(specular_.f0, specular_.f90, glm::dot(flake, wo_));
+      const vec3 in = vec3(1.0f) - schlick(specular_.f0, specular_.f90, cos_i);
+      return out * in;
+    }
+  }
+  return vec3(1.0f);
+}
+
+template <unsigned kChannels>
+vec3 FlakeModel<kChannels>::eval(const vec3& wi, [[maybe_unused]] Rng& rng) const {
+  vec3 single(0.0f);
+  if constexpr (kHasSpecular) {
+    if (chances_.specular > 0) {
+      const float cos_h = glm::dot(half_vector(wo_, wi), wo_);
+      single +=
+          schlick(specular_.f0, specular_.f90, cos_h) * (Sggx(specular_.flakes).specular_phase(wo_, wi) * masking(wi));
+    }
+  }
+  if constexpr (kHasBase) {
+    if (chances_.diffuse + chances_.transmission > 0) {
+      const vec3 flake = Sggx(flakes_).sample_visible(wo_, rng.next(), rng.next());
+      const float c = glm::dot(flake, wi), cos_i = std::abs(c);
+      single += base_albedo(c < 0) * coupling(flake, cos_i) * (cos_i * kInvPi);
+    }
+  }
+  vec3 value = single_share() * single;
+  if constexpr (kHasMultiple) {
+    value += multiple_.share * multiple_.norm * Sggx(flakes_).sigma(wi) * multiple_.albedo;
+  }
   return value;
 }
 
-float FlakePhase::pdf(const vec3& wi) const {
+template <unsigned kChannels>
+float FlakeModel<kChannels>::pdf(const vec3& wi) const {
   float density = 0;
-  if (chances_.specular > 0) density += chances_.specular * Sggx(specular_flakes_).specular_phase(wo_, wi);
-  if (chances_.diffuse > 0) density += chances_.diffuse * diffuse_density(flakes_, wo_, wi);
-  if (chances_.transmission > 0) density += chances_.transmission * diffuse_density(flakes_, wo_, -wi);
-  if (chances_.multiple > 0) density += chances_.multiple * multiple_norm_ * Sggx(flakes_).sigma(wi);
+  if constexpr (kHasSpecular) {
+    if (chances_.specular > 0) density += chances_.specular * Sggx(specular_.flakes).specular_phase(wo_, wi);
+  }
+  if constexpr (kHasDiffuse) {
+    if (chances_.diffuse > 0) density += chances_.diffuse * diffuse_density(flakes_, wo_, wi);
+  }
+  if constexpr (kHasTransmission) {
+    if (chances_.transmission > 0) density += chances_.transmission * diffuse_density(flakes_, wo_, -wi);
+  }
+  if constexpr (kHasMultiple) density += chances_.multiple * multiple_.norm * Sggx(flakes_).sigma(wi);
   return density;
 }
 
-ScatterResult FlakePhase::sample(Rng& rng) const {
+template <unsigned kChannels>
+ScatterResult FlakeModel<kChannels>::sample(Rng& rng) const {
   const Chances& p = chances_;
-  const float u = rng.next();
+  float u = rng.next();
   ScatterResult result;
-  if (u < p.specular) {
-    const Sggx sggx(specular_flakes_);
-    const vec3 flake = sggx.sample_visible(wo_, rng.next(), rng.next());
-    result.wi = reflect_about(wo_, flake);
-    result.weight =
-        schlick(specular_, f90_, glm::dot(flake, wo_)) * (self_shadowing_ / p.specular * specular_masking(result.wi));
-  } else if (u < p.specular + p.diffuse + p.transmission) {
-    const vec3 flake = Sggx(flakes_).sample_visible(wo_, rng.next(), rng.next());
-    const bool through = !(u < p.specular + p.diffuse);
-    result.wi = cosine_lobe(through ? -flake : flake, rng.next(), rng.next());
-    const float share = self_shadowing_ / (through ? p.transmission : p.diffuse);
-    const float cos_i = std::abs(glm::dot(flake, result.wi));
-    result.weight = (through ? transmission_ : diffuse_) * base_value(flake, cos_i) * share;
-  } else if (p.multiple > 0) {
-    result.wi = Sggx(flakes_).sample_sigma(rng);
-    result.weight = multiple_ * ((1 - self_shadowing_) / p.multiple);
-  } else {
-    return {};
+  if constexpr (kHasMultiple) {
+    if (u < p.multiple) {
+      result.wi = Sggx(flakes_).sample_sigma(rng);
+      result.weight = multiple_.albedo;  // chosen with probability 1 - A, which is its share
+      result.pdf = pdf(result.wi);
+      return result;
+    }
+    u -= p.multiple;
   }
+  if constexpr (kHasSpecular) {
+    if (u < p.specular) {
+      const vec3 flake = Sggx(specular_.flakes).sample_visible(wo_, rng.next(), rng.next());
+      result.wi = reflect_about(wo_, flake);
+      result.weight = schlick(specular_.f0, specular_.f90, glm::dot(flake, wo_)) *
+                      (single_share() / p.specular * masking(result.wi));
+      result.pdf = pdf(result.wi);
+      return result;
+    }
+    u -= p.specular;
+  }
+  if (!(p.diffuse + p.transmission > 0)) return {};
+  const vec3 flake = Sggx(flakes_).sample_visible(wo_, rng.next(), rng.next());
+  const bool through = p.transmission > 0 && !(u < p.diffuse);
+  result.wi = cosine_lobe(through ? -flake : flake, rng.next(), rng.next());
+  result.weight = base_albedo(through) * coupling(flake, std::abs(glm::dot(flake, result.wi))) *
+                  (single_share() / (through ? p.transmission : p.diffuse));
   result.pdf = pdf(result.wi);
   return result;
 }
 
+#define FARFIELD_FLAKE_MODELS(shadowing)      \
+  template class FlakeModel<0 | (shadowing)>; \
+  template class FlakeModel<1 | (shadowing)>; \
+  template class FlakeModel<2 | (shadowing)>; \
+  template class FlakeModel<3 | (shadowing)>; \
+  template class FlakeModel<4 | (shadowing)>; \
+  template class FlakeModel<5 | (shadowing)>; \
+  template class FlakeModel<6 | (shadowing)>; \
+  template class FlakeModel<7 | (shadowing)>;
+FARFIELD_FLAKE_MODELS(0)
+FARFIELD_FLAKE_MODELS(kSelfShadowing)
+
 static_assert(sizeof(FlakePhase) <= 160);
+static_assert(sizeof(FlakeModel<kDiffuse>) <= 64);
 
 }  // namespace farfield

@@ -18,6 +18,7 @@
 
 #include "base/random.h"
 #include "base/vec.h"
+#include "scattering/channels.h"
 #include "scattering/scatter_sample.h"
 #include "scattering/sggx.h"
 #include "scattering/sym_mat3.h"
@@ -35,11 +36,13 @@ struct FlakeParams {
   float self_shadowing = 1.0f;  ///< A in (0, 1]; 1: none
 };
 
-/// A voxel's scattering seen from wo, given that a collision happened. Directions are unit, away from the point.
-/// Immutable; any thread. At most 160 bytes, no allocation.
-class FlakePhase {
+/// A voxel's scattering seen from wo, given that a collision happened, with the given channels (scattering/channels.h);
+/// parameters of the others are not looked at. Directions are unit, away from the point. Immutable; any thread. At most
+/// 160 bytes, no allocation.
+template <unsigned kChannels>
+class FlakeModel {
  public:
-  FlakePhase(const FlakeParams& params, const vec3& wo);
+  FlakeModel(const FlakeParams& params, const vec3& wo);
   /// albedo * phase function; an unbiased one-sample estimate for diffuse flakes (rng).
   vec3 eval(const vec3& wi, Rng& rng) const;
   /// The density that multiple importance sampling uses for sample(), per steradian: normalised, and close to the
@@ -51,23 +54,49 @@ class FlakePhase {
   ScatterResult sample(Rng& rng) const;
 
  private:
+  static constexpr bool kHasDiffuse = (kChannels & kDiffuse) != 0;
+  static constexpr bool kHasSpecular = (kChannels & kSpecular) != 0;
+  static constexpr bool kHasTransmission = (kChannels & kTransmission) != 0;
+  static constexpr bool kHasBase = kHasDiffuse || kHasTransmission;
+  static constexpr bool kHasMultiple = (kChannels & kSelfShadowing) != 0;
+
+  /// What only specular flakes need.
+  struct Specular {
+    CholeskyFactor<float> flakes;  ///< scaled so that g <= 1; valid if f90 > 0
+    vec3 f0{0.0f};
+    float f90 = 0;  ///< 0: these flakes have no specular lobe
+  };
+  /// What only self-shadowing needs.
+  struct Multiple {
+    vec3 albedo{0.0f};
+    float norm = 0;   ///< 1 / (4 pi R_G)
+    float share = 0;  ///< 1 - A
+  };
   /// How often sample() picks each kind of event.
   struct Chances {
     float specular = 0, diffuse = 0, transmission = 0, multiple = 0;
   };
 
-  vec3 specular_value(const vec3& wi) const;
-  vec3 base_value(const vec3& flake, float cos_i) const;
-  float specular_masking(const vec3& wi) const;
+  vec3 couple_to_specular(const FlakeParams& params, const SymMat3& s) requires(kHasSpecular);
+  void set_up_multiple(const FlakeParams& params, const SymMat3& s, const vec3& mean_fresnel) requires(kHasMultiple);
+  float single_share() const;
+  float masking(const vec3& wi) const requires(kHasSpecular);
+  vec3 coupling(const vec3& flake, float cos_i) const;
+  vec3 base_albedo(bool through) const;
 
   CholeskyFactor<float> flakes_;
-  CholeskyFactor<float> specular_flakes_;  ///< scaled so that g <= 1; valid if chances_.specular > 0
   vec3 wo_;
-  vec3 diffuse_{0.0f}, specular_{0.0f}, transmission_{0.0f}, multiple_{0.0f};
-  float self_shadowing_ = 1;
-  float f90_ = 0;
-  float multiple_norm_ = 0;  ///< 1 / (4 pi R_G); 0 if self_shadowing is 1
   Chances chances_;
+  [[no_unique_address]] PartIf<kHasDiffuse, vec3> diffuse_{};
+  [[no_unique_address]] PartIf<kHasTransmission, vec3> transmission_{};
+  [[no_unique_address]] PartIf<kHasSpecular, Specular> specular_{};
+  [[no_unique_address]] PartIf<kHasMultiple, Multiple> multiple_{};
+};
+
+/// The model with all channels, for hosts that do not choose.
+class FlakePhase : public FlakeModel<kFlakeChannels> {
+ public:
+  using FlakeModel::FlakeModel;
 };
 
 }  // namespace farfield

@@ -17,6 +17,29 @@ inline vec3 schlick(const vec3& f0, float f90, float cos) {
   return f0 + (vec3(f90) - f0) * x5;
 }
 
+/// Unpolarised reflectance of a smooth dielectric. eta: index inside over index outside, > 0. cos in [0, 1], on the
+/// outside. 1 where all light is reflected.
+inline float fresnel_dielectric(float cos, float eta) {
+  const float sin2_inside = (1.0f - cos * cos) / (eta * eta);
+  if (sin2_inside >= 1.0f) return 1.0f;
+  const float cos_inside = std::sqrt(1.0f - sin2_inside);
+  const float parallel = (eta * cos - cos_inside) / (eta * cos + cos_inside);
+  const float across = (cos - eta * cos_inside) / (cos + eta * cos_inside);
+  return 0.5f * (parallel * parallel + across * across);
+}
+
+/// Unpolarised reflectance of a conductor with index eta + i k against the outside [Born and Wolf, 13.4]. cos in [0,
+/// 1].
+inline float fresnel_conductor(float cos, float eta, float k) {
+  const float cos2 = cos * cos, sin2 = 1.0f - cos2;
+  const float t0 = eta * eta - k * k - sin2;
+  const float a2_b2 = std::sqrt(t0 * t0 + 4.0f * eta * eta * k * k);
+  const float a = std::sqrt(std::max(0.0f, 0.5f * (a2_b2 + t0)));
+  const float across = (a2_b2 + cos2 - 2.0f * a * cos) / (a2_b2 + cos2 + 2.0f * a * cos);
+  const float t3 = cos2 * a2_b2 + sin2 * sin2, t4 = 2.0f * a * cos * sin2;
+  return 0.5f * across * (1.0f + (t3 - t4) / (t3 + t4));
+}
+
 /// The mean of (1 - w.m)^5 over the GGX facets m visible from w: with it, F0 + (F90 - F0) mean is the part of the light
 /// from w that meets the specular lobe, masked or not. What is left is there for a diffuse lobe underneath
 /// (Kelemen and Szirmay-Kalos 2001). From a table, absolute error below 0.02 (at grazing angles); a value, cheap to

@@ -14,6 +14,7 @@
 
 #include "base/random.h"
 #include "base/vec.h"
+#include "scattering/channels.h"
 #include "scattering/microfacet.h"
 #include "scattering/scatter_sample.h"
 #include "scattering/sym_mat3.h"
@@ -30,12 +31,13 @@ struct SurfaceParams {
   float roughness2 = 1.0f;
 };
 
-/// A face seen from wo. Directions are unit, away from the point. Immutable; any thread. At most 160 bytes, no
-/// allocation.
-class SurfaceBsdf {
+/// A face seen from wo, with the given channels (scattering/channels.h); parameters of the others are not looked at.
+/// Directions are unit, away from the point. Immutable; any thread. At most 160 bytes, no allocation.
+template <unsigned kChannels>
+class SurfaceModel {
  public:
   /// n: unit geometric normal with n.wo >= 0. wo at grazing (n.wo == 0) gives a black surface.
-  SurfaceBsdf(const SurfaceParams& params, const vec3& n, const vec3& wo);
+  SurfaceModel(const SurfaceParams& params, const vec3& n, const vec3& wo);
   /// f |cos|; an unbiased one-sample estimate where diffuse microfacets have no closed form (rng).
   vec3 eval(const vec3& wi, Rng& rng) const;
   /// Exact density of sample(), per steradian.
@@ -43,21 +45,42 @@ class SurfaceBsdf {
   ScatterResult sample(Rng& rng) const;
 
  private:
-  vec3 eval_specular(const vec3& wi, float cos_i) const;
-  vec3 eval_base(const vec3& wi, float cos_i, Rng& rng) const;
-  vec3 left_by_specular(const vec3& w, Rng& rng) const;
+  static constexpr bool kHasDiffuse = (kChannels & kDiffuse) != 0;
+  static constexpr bool kHasSpecular = (kChannels & kSpecular) != 0;
+  static constexpr bool kHasTransmission = (kChannels & kTransmission) != 0;
+  static constexpr bool kHasBase = kHasDiffuse || kHasTransmission;
+  static constexpr bool kHasNormals = (kChannels & kNormals) != 0;
 
-  Microfacets specular_facets_;  ///< valid if specular_chance_ > 0
-  Microfacets base_facets_;      ///< valid if not flat_
+  /// What only the specular lobe needs.
+  struct Specular {
+    Microfacets facets;  ///< valid if f90 > 0
+    vec3 f0{0.0f};
+    float f90 = 0;    ///< 0: this face has no specular lobe
+    float alpha = 0;  ///< the lobe's roughness
+  };
+
+  bool is_flat() const;
+  void couple_to_specular(const SurfaceParams& params) requires(kHasSpecular);
+  vec3 fresnel(float cos) const requires(kHasSpecular);
+  vec3 left_by_specular(const vec3& w, Rng& rng) const requires(kHasSpecular);
+  vec3 eval_base(const vec3& wi, float cos_i, Rng& rng) const requires(kHasBase);
+
   vec3 n_, wo_;
-  vec3 diffuse_{0.0f}, specular_{0.0f}, transmission_{0.0f};
-  float cos_o_ = 0;
-  float f90_ = 0;
-  float alpha_ = 0;            ///< of the specular lobe on flat faces
+  float cos_o_;
   float specular_chance_ = 0;  ///< how often sample() picks the lobe; all 0: black
   float diffuse_chance_ = 0;
   float transmission_chance_ = 0;
-  bool flat_ = true;  ///< sggx is n n^T: the base is Lambertian
+  [[no_unique_address]] PartIf<kHasDiffuse, vec3> diffuse_{};
+  [[no_unique_address]] PartIf<kHasTransmission, vec3> transmission_{};
+  [[no_unique_address]] PartIf<kHasSpecular, Specular> specular_{};
+  [[no_unique_address]] PartIf<kHasNormals && kHasBase, Microfacets> base_facets_{};  ///< valid if not flat
+  bool is_flat_ = true;  ///< sggx is n n^T: the base is Lambertian
+};
+
+/// The model with all channels, for hosts that do not choose.
+class SurfaceBsdf : public SurfaceModel<kSurfaceChannels> {
+ public:
+  using SurfaceModel::SurfaceModel;
 };
 
 }  // namespace farfield
