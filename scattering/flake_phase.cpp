@@ -60,9 +60,14 @@ FlakeModel<kChannels>::FlakeModel(const FlakeParams& params, const vec3& wo) : w
     const vec3 excess = glm::max(vec3(1.0f), diffuse_ + transmission_);
     diffuse_ /= excess, transmission_ /= excess;
   }
-  vec3 mean_fresnel(0.0f);
-  if constexpr (kHasSpecular) mean_fresnel = couple_to_specular(params, s);
-  if constexpr (kHasMultiple) set_up_multiple(params, s, mean_fresnel);
+  [[maybe_unused]] vec3 mean_fresnel(0.0f);
+  if constexpr (kHasSpecular || kHasMultiple) {
+    const bool has_specular = kHasSpecular && max_component(params.specular) > 0;
+    const bool has_multiple = kHasMultiple && params.self_shadowing < 1;
+    const vec3 eigen = has_specular || has_multiple ? vec3(eigenvalues(s)) : vec3(1.0f);
+    if constexpr (kHasSpecular) mean_fresnel = couple_to_specular(params, s, eigen);
+    if constexpr (kHasMultiple) set_up_multiple(params, eigen, mean_fresnel);
+  }
 
   const float single = chances_.specular + chances_.diffuse + chances_.transmission;
   const float share = single > 0 ? single_share() / single : 0.0f;
@@ -71,14 +76,14 @@ FlakeModel<kChannels>::FlakeModel(const FlakeParams& params, const vec3& wo) : w
 
 // Sets up the specular flakes and takes from the others what they reflect; returns their mean reflectance.
 template <unsigned kChannels>
-vec3 FlakeModel<kChannels>::couple_to_specular(const FlakeParams& params, const SymMat3& s) requires(kHasSpecular) {
+vec3 FlakeModel<kChannels>::couple_to_specular(const FlakeParams& params, const SymMat3& s,
+                                               const vec3& eigen) requires(kHasSpecular) {
   const vec3 f0 = clamp_albedo(params.specular);
   const float f90 = grazing_reflectance(f0);
   if (!(f90 > 0)) return vec3(0.0f);
   const float roughness2 = params.roughness2 < 1.0f ? std::max(params.roughness2, 0.0f) : 1.0f;
   // sigma^2 / sigma'^2 = 1 / ((1 - r) + r tr(S) / sigma^2) is largest where sigma^2 is lambda_max.
-  const float largest = static_cast<float>(eigenvalues(s).x);
-  const float scale = 1.0f / ((1.0f - roughness2) + roughness2 * s.trace() / largest);
+  const float scale = 1.0f / ((1.0f - roughness2) + roughness2 * s.trace() / eigen.x);
   specular_ = {cholesky(specular_sggx(s, roughness2) * scale), f0, f90};
 
   const vec3 mean = mean_schlick(f0, f90);
@@ -92,14 +97,13 @@ vec3 FlakeModel<kChannels>::couple_to_specular(const FlakeParams& params, const 
 
 // The diffuse albedos are those of flakes already divided by 1 - mean F.
 template <unsigned kChannels>
-void FlakeModel<kChannels>::set_up_multiple(const FlakeParams& params, const SymMat3& s,
+void FlakeModel<kChannels>::set_up_multiple(const FlakeParams& params, const vec3& eigen,
                                             const vec3& mean_fresnel) requires(kHasMultiple) {
   if (!(params.self_shadowing < 1)) return;
   const vec3 left = glm::max(vec3(1e-6f), vec3(1.0f) - mean_fresnel);
   multiple_.albedo = mean_fresnel + left * left * (base_albedo(false) + base_albedo(true));
   if (!(max_component(multiple_.albedo) > 0)) return;
-  const dvec3 l = eigenvalues(s);
-  multiple_.norm = static_cast<float>(1 / (4 * kPiOf<double> * carlson_rg(l.x, l.y, l.z)));
+  multiple_.norm = 1.0f / (4.0f * kPi * carlson_rg(eigen.x, eigen.y, eigen.z));
   multiple_.share = 1.0f - std::max(params.self_shadowing, 0.0f);
   chances_.multiple = multiple_.share;
 }

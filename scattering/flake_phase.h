@@ -77,8 +77,8 @@ class FlakeModel {
     float specular = 0, diffuse = 0, transmission = 0, multiple = 0;
   };
 
-  vec3 couple_to_specular(const FlakeParams& params, const SymMat3& s) requires(kHasSpecular);
-  void set_up_multiple(const FlakeParams& params, const SymMat3& s, const vec3& mean_fresnel) requires(kHasMultiple);
+  vec3 couple_to_specular(const FlakeParams& params, const SymMat3& s, const vec3& eigen) requires(kHasSpecular);
+  void set_up_multiple(const FlakeParams& params, const vec3& eigen, const vec3& mean_fresnel) requires(kHasMultiple);
   float single_share() const;
   float masking(const vec3& wi) const requires(kHasSpecular);
   vec3 coupling(const vec3& flake, float cos_i) const;

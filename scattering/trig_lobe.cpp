@@ -59,6 +59,36 @@ double evaluate(const Polynomial& c, int blocks, double x) {
   return (s0 + x * s1) + x2 * (s2 + x * s3);
 }
 
+/// The cubic through four Chebyshev nodes of segment i.
+LobeSegments::Cubic make_cubic(const Polynomial& c, int blocks, int i) {
+  double x[4], f[4];
+  for (int k = 0; k < 4; ++k) {
+    x[k] = 0.5 - 0.5 * std::cos((2 * k + 1) * kPiOf<double> / 8);
+    const double t = (i + x[k]) / LobeSegments::kCount;
+    f[k] = evaluate(c, blocks, t * t);
+  }
+  // Newton's divided differences, then expanded in powers of x.
+  for (int order = 1; order < 4; ++order) {
+    for (int k = 3; k >= order; --k) f[k] = (f[k] - f[k - 1]) / (x[k] - x[k - order]);
+  }
+  double p[4] = {f[3], 0, 0, 0};
+  for (int k = 2; k >= 0; --k) {
+    for (int d = 3; d > 0; --d) p[d] = p[d - 1] - x[k] * p[d];
+    p[0] = f[k] - x[k] * p[0];
+  }
+  return {{float(p[0]), float(p[1]), float(p[2]), float(p[3])}};
+}
+
+LobeSegments make_segments(const LobeCoefficients& c) {
+  LobeSegments segments;
+  for (int i = 0; i < LobeSegments::kCount; ++i) {
+    segments.sigma[i] = make_cubic(c.sigma, c.blocks, i);
+    segments.shadow[i] = {make_cubic(c.shadow_w, c.blocks, i), make_cubic(c.shadow_axis, c.blocks, i),
+                          make_cubic(c.shadow_trace, c.blocks, i), make_cubic(c.shadow_cross, c.blocks, i)};
+  }
+  return segments;
+}
+
 double power(double x, int n) {
   double result = 1;
   for (; n > 0; n >>= 1, x *= x) {
@@ -149,10 +179,24 @@ const LobeCoefficients& lobe_coefficients(LobeKind kind, int n) {
   return table[kind == LobeKind::Cosine ? 0 : 1][n];
 }
 
+const LobeSegments& lobe_segments(LobeKind kind, int n) {
+  using Row = std::array<LobeSegments, kLargestLobeExponent + 1>;
+  static const std::array<Row, 2> table = [] {
+    std::array<Row, 2> t;
+    for (int i = 0; i <= kLargestLobeExponent; ++i) {
+      t[0][i] = make_segments(lobe_coefficients(LobeKind::Cosine, i));
+      t[1][i] = make_segments(lobe_coefficients(LobeKind::Sine, i));
+    }
+    return t;
+  }();
+  return table[kind == LobeKind::Cosine ? 0 : 1][n];
+}
+
 template <typename T>
 BasicTrigLobe<T>::BasicTrigLobe(LobeKind kind, int n, const Vec3<T>& axis)
-    : coefficients_(nullptr), axis_(axis), n_(std::clamp(n, 0, kLargestLobeExponent)), kind_(kind) {
+    : coefficients_(nullptr), segments_(nullptr), axis_(axis), n_(std::clamp(n, 0, kLargestLobeExponent)), kind_(kind) {
   coefficients_ = &lobe_coefficients(kind_, n_);
+  segments_ = &lobe_segments(kind_, n_);
   sampling_power_ = kind == LobeKind::Cosine ? T(2 * n_ + 1) / T(2 * n_ + 3) : T(1) / T(2 * n_ + 3);
 }
 
@@ -163,13 +207,25 @@ T BasicTrigLobe<T>::ndf(const Vec3<T>& m) const {
 }
 
 template <typename T>
-T BasicTrigLobe<T>::sigma(const Vec3<T>& w) const {
+T BasicTrigLobe<T>::sigma_exact(const Vec3<T>& w) const {
   const double t = glm::dot(w, axis_);
   return static_cast<T>(evaluate(coefficients_->sigma, coefficients_->blocks, std::min(t * t, 1.0)));
 }
 
 template <typename T>
 T BasicTrigLobe<T>::shadowed_sigma(const Vec3<T>& w, const SymMat3& s) const {
+  if constexpr (std::is_same_v<T, double>) return shadowed_sigma_exact(w, s);
+  const T t = glm::dot(w, axis_);
+  const auto [segment, x] = locate(t);
+  const LobeSegments::Shadow& c = segments_->shadow[segment];
+  const vec3 sw = s * vec3(w), axis(axis_);
+  const float value = glm::dot(vec3(w), sw) * c.w.at(x) + s.quadratic(axis) * c.axis.at(x) + s.trace() * c.trace.at(x) +
+                      static_cast<float>(t) * glm::dot(sw, axis) * c.cross.at(x);
+  return std::max(0.0f, value);
+}
+
+template <typename T>
+T BasicTrigLobe<T>::shadowed_sigma_exact(const Vec3<T>& w, const SymMat3& s) const {
   const LobeCoefficients& c = *coefficients_;
   const dvec3 direction(w), axis(axis_);
   const double t = glm::dot(direction, axis), t2 = std::min(t * t, 1.0);
@@ -254,34 +310,46 @@ template class BasicTrigLobe<float>;
 template class BasicTrigLobe<double>;
 
 template <typename T>
-BasicLobeMixture<T>::BasicLobeMixture(std::span<const WeightedLobe<T>> lobes) {
+BasicLobeMixture<T>::BasicLobeMixture(std::span<const WeightedLobe<T>> lobes) : isotropic_(0) {
   T total = 0;
   for (const WeightedLobe<T>& lobe : lobes) {
-    if (count_ == kMaxLobes || !(lobe.weight > 0) || !std::isfinite(lobe.weight)) continue;
-    lobes_[count_++] = lobe, total += lobe.weight;
+    const bool is_isotropic = lobe.lobe.exponent() == 0;
+    if (!(lobe.weight > 0) || !std::isfinite(lobe.weight) || (!is_isotropic && count_ == kMaxLobes)) continue;
+    total += lobe.weight;
+    if (is_isotropic) {
+      isotropic_ += lobe.weight;
+    } else {
+      lobes_[count_++] = lobe;
+    }
   }
-  for (size_t i = 0; i < count_; ++i) lobes_[i].weight /= total;
-  if (count_ == 0) lobes_[count_++].weight = 1;
+  if (!(total > 0)) {
+    isotropic_ = 1;
+    return;
+  }
+  isotropic_ /= total;
+  for (int i = 0; i < count_; ++i) lobes_[i].weight /= total;
 }
 
 template <typename T>
 Vec3<T> BasicLobeMixture<T>::sample_normal(Rng& rng) const {
   T pick = next<T>(rng);
-  size_t i = 0;
-  while (i + 1 < count_ && pick >= lobes_[i].weight) pick -= lobes_[i++].weight;
-  return lobes_[i].lobe.sample_normal(rng);
+  for (int i = 0; i < count_; ++i) {
+    if (pick < lobes_[i].weight || (i + 1 == count_ && isotropic_ == 0)) return lobes_[i].lobe.sample_normal(rng);
+    pick -= lobes_[i].weight;
+  }
+  return uniform_sphere(next<T>(rng), next<T>(rng));
 }
 
 template <typename T>
 Vec3<T> BasicLobeMixture<T>::sample_visible(const Vec3<T>& w, Rng& rng) const {
-  if (count_ == 1) return lobes_[0].lobe.sample_visible(w, rng);
-  std::array<T, kMaxLobes> visible{};
-  T total = 0;
-  for (size_t i = 0; i < count_; ++i) total += visible[i] = lobes_[i].weight * lobes_[i].lobe.sigma(w);
+  T visible[kMaxLobes], total = isotropic_ / T(4);
+  for (int i = 0; i < count_; ++i) total += visible[i] = lobes_[i].weight * lobes_[i].lobe.sigma(w);
   T pick = next<T>(rng) * total;
-  size_t i = 0;
-  while (i + 1 < count_ && pick >= visible[i]) pick -= visible[i++];
-  return lobes_[i].lobe.sample_visible(w, rng);
+  for (int i = 0; i < count_; ++i) {
+    if (pick < visible[i] || (i + 1 == count_ && isotropic_ == 0)) return lobes_[i].lobe.sample_visible(w, rng);
+    pick -= visible[i];
+  }
+  return cosine_lobe(w, next<T>(rng), next<T>(rng));
 }
 
 template class BasicLobeMixture<float>;
