@@ -21,9 +21,9 @@ static_assert(sizeof(InteractionModel) <= 256 && alignof(InteractionModel) <= 16
 static_assert(std::is_trivially_copyable_v<InteractionModel> && std::is_trivially_destructible_v<InteractionModel>);
 
 // A hit is off its surface by a few roundings of the coordinates that went into it: the ray's origin, the way to the
-// hit, and the transform's translation, each 2^-24 of its size. Measured over random transforms (interaction_test):
-// a factor of 8 leaves no self-hit, so 32 is safe and still 2e-6 of the scene.
-constexpr float kOffsetRoundings = 32.0f * 0x1p-24f;
+// hit, and the transform's translation, each 2^-24 of its size. Over random transforms (runtime_test), a factor of 1
+// leaves self-hits and 4 leaves none; 16 is that with a margin, and 1e-6 of the scene.
+constexpr float kOffsetRoundings = 16.0f * 0x1p-24f;
 
 // next_cone_spread: a sampled direction stands for a lobe of solid angle about 1 / pdf, a cone of spread
 // 2 sqrt(1 / (pi pdf)). This is the share of that spread which one path's ray covers: 1/8 makes 0.25 rad of the middle

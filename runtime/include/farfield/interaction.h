@@ -39,8 +39,8 @@ class FARFIELD_API Interaction {
   glm::vec3 albedo{0.0f};            ///< diffuse + specular + transmission, for AOVs and denoisers
 
   /// Origin for a ray that leaves in direction wi: offset to wi's side of a surface, the point itself in a volume. The
-  /// offset is a few roundings of all coordinates that went into the hit (2e-6 of them), so that the ray, with tnear 0,
-  /// does not meet the same face again; at 1e7 units from the world's origin that is about 50 units.
+  /// offset is a few roundings of all coordinates that went into the hit (1e-6 of them), so that the ray, with tnear 0,
+  /// does not meet the same face again; at 1e7 units from the world's origin that is about 30 units.
   glm::vec3 ray_origin(const glm::vec3& wi) const;
   /// Draws wi. The number of values taken from rng varies.
   ScatterSample sample(Rng& rng) const;
