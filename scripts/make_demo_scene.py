@@ -303,7 +303,7 @@ def build(path):
     doc["nodes"].append({"name": "sun", "extensions": {"KHR_lights_punctual": {"light": 0}},
                          "rotation": look_at_quaternion((0.75, 0.85, 0.75), (0.0, 0.0, 0.0))})
     doc["extensions"] = {"KHR_lights_punctual": {"lights": [
-        {"type": "directional", "name": "sun", "color": [1.0, 0.93, 0.82], "intensity": 4.0}]}}
+        {"type": "directional", "name": "sun", "color": [1.0, 0.93, 0.82], "intensity": 3000.0}]}}
     camera = len(doc["nodes"])
     doc["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.62, "aspectRatio": 16 / 9, "znear": 0.01}}]
     eye, aim = way[0]
