@@ -185,7 +185,7 @@ def plant(rng, path, count):
     """Positions at least 4.2 m apart that leave the camera's way free."""
     places = [(0.0, 0.0)]
     while len(places) < count:
-        radius = 230.0 * math.sqrt(rng.random())
+        radius = 210.0 * math.sqrt(rng.random())
         angle = rng.uniform(0, 2 * math.pi)
         x, z = radius * math.cos(angle), radius * math.sin(angle)
         if any((x - px) ** 2 + (z - pz) ** 2 < 4.2 ** 2 for px, pz in places):
@@ -293,7 +293,7 @@ def build(path):
         doc["meshes"].append({"name": name, "primitives": parts})
 
     doc["nodes"] = [{"name": "ground", "mesh": 0}]
-    for i, (x, z) in enumerate(plant(rng, way, 420)):
+    for i, (x, z) in enumerate(plant(rng, way, 1500)):
         turn = rng.uniform(0, 2 * math.pi) if i else 0.0
         scale = rng.uniform(0.8, 1.3) if i else 1.0
         doc["nodes"].append({"name": "tree %d" % i, "mesh": 1 if i == 0 or rng.random() < 0.6 else 2,
