@@ -32,7 +32,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint32_t kMaxGrid = 4096;       ///< the brick table has (grid / 8)^3 entries
-constexpr uint64_t kLeastVoxelBytes = 7;  ///< a byte of density and 6 of SGGX
 constexpr uint32_t kVoxelizeVersion = 1;  ///< goes up when voxelize() or pack_volume() give other results
 
 /// Seconds since it was made.
@@ -135,6 +134,22 @@ uint64_t volume_key(const Surface& geometry, const VoxelLattice& lattice, const 
   key = hash_values<vec3>(geometry.positions, key);
   key = hash_values<uvec3>(geometry.triangles, key);
   return hash_values<FaceMaterial>(geometry.materials, key);
+}
+
+/// Less than what a level with such a volume and surface has resident.
+uint64_t least_bytes(const VolumeSize& volume, const Surface& voxelized, const Surface& surface) {
+  constexpr uint64_t kTriangle = 20;  // a BVH of quads takes more, without any array of ours
+  const auto any = [&](vec3 FaceMaterial::*channel) {
+    return std::any_of(voxelized.materials.begin(), voxelized.materials.end(),
+                       [&](const FaceMaterial& m) { return max_component(m.*channel) > 0; });
+  };
+  uint64_t per_voxel = sizeof(PackedFlakeSggx);
+  if (any(&FaceMaterial::diffuse)) per_voxel += sizeof(PackedColor);
+  if (any(&FaceMaterial::specular)) per_voxel += sizeof(PackedColor) + 1;
+  if (any(&FaceMaterial::transmission)) per_voxel += sizeof(PackedColor);
+  const uint64_t bytes =
+      per_voxel * volume.voxels + sizeof(Brick) * volume.bricks + kTriangle * surface.triangles.size();
+  return bytes - bytes / 10;  // the estimate's own error
 }
 
 /// All vertices and stored voxels of a level.
@@ -277,11 +292,15 @@ class Baker {
       level_report.resumed = true;
       return std::move(*stored);
     }
-    if (level != last_level_ &&
-        estimate_voxels(sub_resolution_, lattice) * kLeastVoxelBytes > most_bytes_worth_writing(level)) {
-      level_report.worthless = true;
-      level_report.triangles = surface_.triangles.size();
-      return LevelData{};
+    if (level != last_level_) {  // the root is always wanted
+      const auto size = estimate_volume(sub_resolution_, lattice, voxelize_options);
+      if (!size) return tl::unexpected<Error>(size.error());
+      if (least_bytes(*size, sub_resolution_, surface_) > most_bytes_worth_writing(level)) {
+        level_report.worthless = true;
+        level_report.triangles = surface_.triangles.size();
+        level_report.voxelize_seconds = watch.seconds();
+        return LevelData{};
+      }
     }
     const auto volume = voxelize(sub_resolution_, lattice, voxelize_options);
     if (!volume) return tl::unexpected<Error>(volume.error());

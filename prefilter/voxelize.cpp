@@ -271,6 +271,49 @@ uint32_t rays_per_voxel(uint64_t voxels, const VoxelizeOptions& options) {
   return static_cast<uint32_t>(factor) * options.rays_per_voxel;
 }
 
+/// The voxels that may be hit.
+struct Candidates {
+  VoxelSet all, near;  ///< near: those that touch a voxel with geometry
+
+  Candidates(const Surface& geometry, const VoxelLattice& lattice) {
+    const VoxelSet marked = mark_voxels(geometry, lattice);
+    all = widen(marked, kReach);
+    near = widen(marked, kNearReach);
+  }
+};
+
+/// The kept voxels of every stride-th candidate brick; the masks of these bricks become theirs.
+Result<std::vector<std::vector<Voxel>>> measure_bricks(const Surface& geometry, const VoxelLattice& lattice,
+                                                       Candidates& candidates, size_t stride,
+                                                       const VoxelizeOptions& options) {
+  VoxelSet& bricks = candidates.all;
+  std::vector<std::vector<Voxel>> voxels(bricks.coordinates.size());
+  if (voxels.empty()) return voxels;
+  const RayScene rays(geometry);
+  if (!rays.is_valid()) {
+    return make_error(ErrorCode::Io, "voxelize: Embree could not build the geometry (out of memory?)");
+  }
+  const Measurement measurement{geometry, lattice, rays.scene(), rays_per_voxel(candidates.near.size(), options),
+                                options.seed};
+  const size_t count = (voxels.size() + stride - 1) / stride;
+  std::atomic<size_t> done{0};  // relaxed: only for the progress
+  const std::thread::id caller = std::this_thread::get_id();
+  parallel_for(count, 4, [&](size_t begin, size_t end) {
+    if (is_cancelled(options)) return;
+    for (size_t i = begin * stride; i < end * stride && i < voxels.size(); i += stride) {
+      const ivec3& coordinate = bricks.coordinates[i];
+      voxels[i] = measure_brick(measurement, coordinate, bricks.masks[i], candidates.near.find(coordinate));
+    }
+    const size_t bricks_done = done.fetch_add(end - begin, std::memory_order_relaxed) + end - begin;
+    if (options.progress && std::this_thread::get_id() == caller) {
+      options.progress(static_cast<double>(bricks_done) / static_cast<double>(count));
+    }
+  });
+  if (is_cancelled(options)) return make_error(ErrorCode::Cancelled, "voxelize: cancelled");
+  if (options.progress) options.progress(1);
+  return voxels;
+}
+
 }  // namespace
 
 Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options) {
@@ -279,54 +322,37 @@ Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& latti
   }
   SparseVolume volume;
   volume.lattice = lattice;
-  if (geometry.triangles.empty()) return volume;
-
-  const VoxelSet marked = mark_voxels(geometry, lattice);
-  const VoxelSet near = widen(marked, kNearReach);
-  VoxelSet candidates = widen(marked, kReach);
-  const RayScene rays(geometry);
-  if (!rays.is_valid())
-    return make_error(ErrorCode::Io, "voxelize: Embree could not build the geometry (out of memory?)");
-  const Measurement measurement{geometry, lattice, rays.scene(), rays_per_voxel(near.size(), options), options.seed};
-
-  const size_t brick_count = candidates.coordinates.size();
-  std::vector<std::vector<Voxel>> voxels(brick_count);
-  std::atomic<size_t> done{0};  // relaxed: only for the progress
-  const std::thread::id caller = std::this_thread::get_id();
-  parallel_for(brick_count, 4, [&](size_t begin, size_t end) {
-    if (is_cancelled(options)) return;
-    for (size_t i = begin; i < end; ++i) {
-      const ivec3& coordinate = candidates.coordinates[i];
-      voxels[i] = measure_brick(measurement, coordinate, candidates.masks[i], near.find(coordinate));
-    }
-    const size_t bricks_done = done.fetch_add(end - begin, std::memory_order_relaxed) + end - begin;
-    if (options.progress && std::this_thread::get_id() == caller) {
-      options.progress(static_cast<double>(bricks_done) / static_cast<double>(brick_count));
-    }
-  });
-  if (is_cancelled(options)) return make_error(ErrorCode::Cancelled, "voxelize: cancelled");
-  if (options.progress) options.progress(1);
-
-  for (size_t i = 0; i < brick_count; ++i) {
-    if (voxels[i].empty()) continue;
-    volume.bricks.push_back({candidates.coordinates[i], candidates.masks[i], volume.voxels.size()});
-    volume.voxels.insert(volume.voxels.end(), voxels[i].begin(), voxels[i].end());
-    voxels[i] = {};
+  Candidates candidates(geometry, lattice);
+  auto voxels = measure_bricks(geometry, lattice, candidates, 1, options);
+  if (!voxels) return tl::unexpected<Error>(voxels.error());
+  for (size_t i = 0; i < voxels->size(); ++i) {
+    std::vector<Voxel>& of_brick = (*voxels)[i];
+    if (of_brick.empty()) continue;
+    volume.bricks.push_back({candidates.all.coordinates[i], candidates.all.masks[i], volume.voxels.size()});
+    volume.voxels.insert(volume.voxels.end(), of_brick.begin(), of_brick.end());
+    of_brick = {};
   }
   return volume;
 }
 
-uint64_t estimate_voxels(const Surface& geometry, const VoxelLattice& lattice) {
-  if (!check_arguments(geometry, lattice, {}) || geometry.triangles.empty()) return 0;
-  double area = 0;
-  for (const uvec3& t : geometry.triangles) {
-    const dvec3 a(geometry.positions[t.x]);
-    area += 0.5 * glm::length(glm::cross(dvec3(geometry.positions[t.y]) - a, dvec3(geometry.positions[t.z]) - a));
+Result<VolumeSize> estimate_volume(const Surface& geometry, const VoxelLattice& lattice,
+                                   const VoxelizeOptions& options) {
+  constexpr size_t kStride = 32, kEnoughBricks = 64;
+  if (auto checked = check_arguments(geometry, lattice, options); !checked) {
+    return tl::unexpected<Error>(checked.error());
   }
-  // The mean optical depths of all voxels add up to half the area; where it is spread thin, each voxel that is kept
-  // takes kFaintestDepth of it.
-  const double depth = 0.5 * area / (lattice.voxel_size * lattice.voxel_size);
-  return std::min(mark_voxels(geometry, lattice).size(), static_cast<uint64_t>(0.5 * depth / kFaintestDepth));
+  VolumeSize size;
+  Candidates candidates(geometry, lattice);
+  if (candidates.all.coordinates.size() < kStride * kEnoughBricks) return size;
+  VoxelizeOptions quietly = options;
+  quietly.progress = nullptr;
+  const auto voxels = measure_bricks(geometry, lattice, candidates, kStride, quietly);
+  if (!voxels) return tl::unexpected<Error>(voxels.error());
+  for (const std::vector<Voxel>& of_brick : *voxels) {
+    size.voxels += kStride * of_brick.size();
+    size.bricks += of_brick.empty() ? 0 : kStride;
+  }
+  return size;
 }
 
 }  // namespace farfield

@@ -384,11 +384,17 @@ TEST_F(Bake, LeavesOutLevelsThatSaveNothing) {
 
 TEST_F(Bake, DoesNotVoxeliseWhatCannotSaveAnything) {
   BakeOptions options = small_options();
+  options.finest_grid = 128;
   options.measure_resident = [](const LevelView& level) {
-    return Result<ResidentCost>(ResidentCost{level.header.level == 0 ? 10000u : 1000u >> level.header.level, 1});
+    return Result<ResidentCost>(ResidentCost{level.header.level == 0 ? 100000u : 1000u >> level.header.level, 1});
   };
-  const auto report = bake(ball_in_leaves(), "thing", out(), options);
+  ImportedAsset specks;  // all smaller than a voxel, in most of some 5000 bricks
+  test::LeafCloud cloud;
+  cloud.leaf_size = 0.006f;
+  specks.surface = test::leaf_cloud(cloud);
+  const auto report = bake(std::move(specks), "specks", out(), options);
   ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->levels[1].voxelized_triangles, 8000u);
   EXPECT_TRUE(report->levels[1].worthless);
   EXPECT_FALSE(report->levels[1].is_written);
   EXPECT_FALSE(report->levels.back().worthless);

@@ -84,18 +84,21 @@ TEST(Voxelize, ThinsOutFaintVoxelsButKeepsTheirArea) {
   }
 }
 
-TEST(Voxelize, StoresAboutAsManyVoxelsAsEstimatedOrMore) {
-  for (const float leaf_size : {0.002f, 0.02f, 0.2f}) {
-    for (const double side : {8.0, 32.0}) {
-      LeafCloud cloud;
-      cloud.count = 1000;
-      cloud.leaf_size = leaf_size;
-      const Surface leaves = leaf_cloud(cloud);
-      const uint64_t estimate = estimate_voxels(leaves, lattice_of(1 / side));
-      EXPECT_LE(estimate, voxelized(leaves, 1 / side, 50).voxels.size() + 20) << leaf_size << " " << side;
-    }
-  }
-  EXPECT_EQ(estimate_voxels({}, lattice_of(1)), 0u);
+TEST(EstimateVolume, IsAboutWhatIsStored) {
+  VoxelizeOptions options;
+  options.rays_per_voxel = 20;
+  const Surface leaves = leaf_cloud({});
+  const auto size = estimate_volume(leaves, lattice_of(1.0 / 96), options);
+  const auto volume = voxelize(leaves, lattice_of(1.0 / 96), options);
+  EXPECT_NEAR(double(size->voxels) / double(volume->voxels.size()), 1, 0.1);
+  EXPECT_NEAR(double(size->bricks) / double(volume->bricks.size()), 1, 0.1);
+}
+
+TEST(EstimateVolume, DoesNotBotherWithSmallOnes) {
+  const Surface leaves = leaf_cloud({});
+  EXPECT_EQ(estimate_volume(leaves, lattice_of(1.0 / 8), {})->voxels, 0u);
+  EXPECT_EQ(estimate_volume({}, lattice_of(1), {})->voxels, 0u);
+  EXPECT_FALSE(estimate_volume(leaves, lattice_of(-1), {}).has_value());
 }
 
 TEST(Voxelize, LetsAsMuchLightThroughAsTheLeavesDo) {
