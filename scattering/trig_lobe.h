@@ -96,8 +96,9 @@ class BasicTrigLobe {
     float x;
   };
   static Place locate(T t) {
-    const float scaled = std::min(static_cast<float>(std::abs(t)), 1.0f) * LobeSegments::kCount;
-    const int segment = std::min(static_cast<int>(scaled), LobeSegments::kCount - 1);
+    // Just below 1, so that the last segment needs no test of its own.
+    const float scaled = std::min(static_cast<float>(std::abs(t)), 1.0f - 0x1p-24f) * LobeSegments::kCount;
+    const int segment = static_cast<int>(scaled);
     return {segment, scaled - static_cast<float>(segment)};
   }
   T sigma_exact(const Vec3<T>& w) const;
@@ -158,10 +159,9 @@ class BasicLobeMixture {
   static T trace(const SymMat3& s) { return T(s.xx) + T(s.yy) + T(s.zz); }
   template <typename Value>
   T sum(T of_isotropic, const Value& value) const {
-    T total = isotropic_ * of_isotropic;
-    if (count_ > 0) total += lobes_[0].weight * value(lobes_[0].lobe);
-    if (count_ > 1) total += lobes_[1].weight * value(lobes_[1].lobe);
-    return total;
+    // Absent lobes have weight 0: cheaper than asking.
+    return isotropic_ * of_isotropic +
+           (lobes_[0].weight * value(lobes_[0].lobe) + lobes_[1].weight * value(lobes_[1].lobe));
   }
 
   std::array<WeightedLobe<T>, kMaxLobes> lobes_{};

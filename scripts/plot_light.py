@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws the figures of docs/results/light.md from the numbers of build/release/bin/scattering_figures.
 
-usage: scripts/plot_light.py CSV_FOLDER PNG_FOLDER      (needs python3-matplotlib)
+usage: scripts/plot_light.py CSV_FOLDER PNG_FOLDER      (needs Debian's python3-matplotlib)
 """
 import csv
 import sys
