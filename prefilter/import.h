@@ -23,11 +23,13 @@ struct ImportedAsset {
   std::vector<std::string> warnings;  ///< one line each: dropped faces, missing textures, ignored features
 };
 
-/// Reads one asset. Polygons are triangulated (quads along the shorter diagonal, concave ones correctly), vertices that
-/// share a position are welded, textures are averaged over each face, alpha-masked faces are cut along the mask's
-/// outline, degenerate and NaN faces are dropped with a warning. Anything that leaves no face with area is an error.
-/// Errors: NotFound, Io, BadFile, Unsupported: one line that names the file, the place and the remedy. Never crashes on
-/// bad files.
+/// Reads one asset. Polygons are triangulated (quads along the diagonal that lies inside, the shorter of two; concave
+/// ones correctly), vertices that share a position up to rounding are welded, triangles that coincide are kept once,
+/// textures are averaged over each face, alpha-masked faces are cut along the mask's outline, degenerate and NaN faces
+/// are dropped with a warning. What materials become is written in docs/decisions/0004. Anything that leaves no face
+/// with area is an error, and so is a longest side outside [1e-6, 1e9], which single precision cannot work in.
+/// Errors: NotFound, Io, BadFile, Unsupported, InvalidArgument (no such mesh): one line that names the file, the place
+/// and the remedy. Never crashes on bad files.
 Result<ImportedAsset> import_asset(const std::filesystem::path& path, const ImportOptions& options = {});
 
 }  // namespace farfield
