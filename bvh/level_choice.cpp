@@ -12,9 +12,9 @@ SlotBlend split_slots(const TracedAsset& asset, float lambda) {
   uint32_t slot = asset.finest_slot;
   while (slot + 1 < asset.slot_count() && asset.level_numbers[slot + 1] <= lambda) ++slot;
   if (slot + 1 == asset.slot_count()) return {slot, 0.0f};
-  const float finer = asset.level_numbers[slot];
+  // A level that is not stored saves nothing over the finer one, which serves in its place.
   const float coarser = asset.level_numbers[slot + 1];
-  return {slot, std::max(0.0f, (lambda - finer) / (coarser - finer))};
+  return {slot, std::max(0.0f, lambda - (coarser - 1))};
 }
 
 LevelChoice choose_level(const TracedAsset& asset, const InstanceFootprint& footprint, uint32_t instance,

@@ -16,8 +16,9 @@ struct InstanceFootprint {
   float world_to_r0 = 0;       ///< lod_scale / instance scale: turns world footprints into local ones
 };
 
-/// The stored levels that lambda lies between: `slot`, and slot + 1 for the share `blend` of paths. lambda is clamped
-/// to what the plan allows and to the root.
+/// The stored levels that lambda lies between: `slot`, and slot + 1 for the share `blend` of paths. Levels blend over
+/// the one octave below the coarser of the two; before that, where levels are missing, the finer one serves alone.
+/// lambda is clamped to what the plan allows and to the root.
 struct SlotBlend {
   uint32_t slot;
   float blend;  ///< in [0, 1); 0 at the root
@@ -32,7 +33,7 @@ struct LevelChoice {
 
 /// lambda is that of the wider of the camera's footprint on the instance and the ray's cone where it enters the
 /// instance's bounds (t_entry), no finer than the plan allows. Between two stored levels a < b the path sees b with
-/// probability (lambda - a) / (b - a), decided by path_seed and instance alone, so every ray of the path sees the
+/// probability max(0, lambda - (b - 1)), decided by path_seed and instance alone, so every ray of the path sees the
 /// same one. A ray that leaves a hit on this instance keeps that hit's level. forced_lambda replaces lambda.
 LevelChoice choose_level(const TracedAsset& asset, const InstanceFootprint& footprint, uint32_t instance,
                          const RayContext& ray, float t_entry, const std::optional<float>& forced_lambda);

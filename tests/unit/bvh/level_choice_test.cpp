@@ -40,9 +40,13 @@ TEST(LevelChoice, PathsSeeTheCoarserLevelWithTheProbabilityOfTheBlend) {
   }
 }
 
-TEST(LevelChoice, GapsAreBlendedOverTheirWholeWidth) {
+TEST(LevelChoice, FinerLevelServesAcrossAGapUntilTheLastOctave) {
   const TracedAsset asset = asset_with({0, 1, 5});
-  const std::vector<double> share = shares(asset, 2.0f);
+  for (const float lambda : {1.0f, 2.0f, 3.99f}) {
+    const std::vector<double> share = shares(asset, lambda);
+    EXPECT_NEAR(share[1], 1.0, 1e-9) << lambda;
+  }
+  const std::vector<double> share = shares(asset, 4.25f);
   EXPECT_EQ(share[0], 0.0);
   EXPECT_NEAR(share[1], 0.75, 0.018);
   EXPECT_NEAR(share[2], 0.25, 0.018);
