@@ -73,8 +73,15 @@ Result<int> wait_for(pid_t child, const RenderOptions& options) {
   }
 }
 
+// Not "/proc/self/exe" itself, so that the child has this program's name in `ps`.
+std::string this_program() {
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  return error ? "/proc/self/exe" : program.string();
+}
+
 std::vector<std::string> bake_command(const RenderOptions& options, size_t mesh, const fs::path& folder) {
-  std::vector<std::string> command = {options.baker.empty() ? "/proc/self/exe" : options.baker.string(),
+  std::vector<std::string> command = {options.baker.empty() ? this_program() : options.baker.string(),
                                       "bake",
                                       options.scene.string(),
                                       "-o",

@@ -16,7 +16,7 @@
 namespace farfield {
 namespace {
 
-constexpr float kAllLevels[] = {0, 0.5f, 1, 2, 2.5f, 3, 4, 5};
+constexpr float kAllLevels[] = {0, 0.5f, 1, 2, 2.5f, 3, 4.5f, 5};
 
 // One sphere asset on disk for all tests of this file.
 class PathTrace : public ::testing::Test {
@@ -91,7 +91,7 @@ TEST_F(PathTrace, WhiteFurnaceIsOneInTheMeanWithEveryStrategy) {
 
 TEST_F(PathTrace, AllStrategiesGiveTheSameImage) {
   const Lights lights = sun_light();
-  for (const float lambda : {0.0f, 0.5f, 2.0f, 3.0f, 4.0f}) {
+  for (const float lambda : {0.0f, 0.5f, 2.0f, 3.0f, 4.5f}) {
     const auto view = open(brown(), lambda);
     const auto mean = [&](LightStrategy strategy, int channel) {
       const auto images = view->render(view_options(24, 128, strategy), lights);
