@@ -26,7 +26,7 @@ struct ImportedAsset {
 /// Reads one asset. Polygons are triangulated (quads along the diagonal that lies inside, the shorter of two; concave
 /// ones correctly), vertices that share a position up to rounding are welded, triangles that coincide are kept once,
 /// textures are averaged over each face, alpha-masked faces are cut along the mask's outline, degenerate and NaN faces
-/// are dropped with a warning. What materials become is written in docs/decisions/0004. Anything that leaves no face
+/// are dropped with a warning. What materials become is written in docs/decisions/0006. Anything that leaves no face
 /// with area is an error, and so is a longest side outside [1e-6, 1e9], which single precision cannot work in.
 /// Errors: NotFound, Io, BadFile, Unsupported, InvalidArgument (no such mesh): one line that names the file, the place
 /// and the remedy. Never crashes on bad files.
