@@ -58,18 +58,21 @@ std::array<VisibleFresnelRow, kAlphaCount> make_table() {
   return table;
 }
 
+/// Clamped to [0, 1]; NaN gives 1, so that no index is ever out of range.
+float unit_range(float x) { return std::max(0.0f, std::min(1.0f, x)); }
+
 }  // namespace
 
 VisibleFresnel::VisibleFresnel(float alpha) {
   static const std::array<VisibleFresnelRow, kAlphaCount> table = make_table();
-  const float x = std::clamp(alpha, 0.0f, 1.0f) * (kAlphaCount - 1);
+  const float x = unit_range(alpha) * (kAlphaCount - 1);
   const int index = std::min(static_cast<int>(x), kAlphaCount - 2);
   low_ = &table[index], high_ = &table[index + 1];
   blend_ = x - static_cast<float>(index);
 }
 
 float VisibleFresnel::grazing_share(float cos) const {
-  const float x = std::clamp(cos, 0.0f, 1.0f) * (kCosCount - 1);
+  const float x = unit_range(cos) * (kCosCount - 1);
   const int i = std::min(static_cast<int>(x), kCosCount - 2);
   const float t = x - static_cast<float>(i);
   const float low = low_->share[i] + (low_->share[i + 1] - low_->share[i]) * t;

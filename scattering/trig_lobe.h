@@ -96,8 +96,9 @@ class BasicTrigLobe {
     float x;
   };
   static Place locate(T t) {
-    // Just below 1, so that the last segment needs no test of its own.
-    const float scaled = std::min(static_cast<float>(std::abs(t)), 1.0f - 0x1p-24f) * LobeSegments::kCount;
+    // Just below 1, so that the last segment needs no test of its own. In this order min takes NaN to a valid place
+    // too.
+    const float scaled = std::min(1.0f - 0x1p-24f, static_cast<float>(std::abs(t))) * LobeSegments::kCount;
     const int segment = static_cast<int>(scaled);
     return {segment, scaled - static_cast<float>(segment)};
   }

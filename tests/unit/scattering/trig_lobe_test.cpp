@@ -175,6 +175,17 @@ TEST(TrigLobe, FloatAgreesWithDouble) {
   EXPECT_LT(worst_shadowed, 5e-6);
 }
 
+TEST(TrigLobe, FloatSurvivesEveryDirection) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const TrigLobe lobe(LobeKind::Cosine, 20, {0, 0, 1});
+  const Lobed exact(LobeKind::Cosine, 20, {0, 0, 1});
+  EXPECT_NEAR(lobe.sigma({0, 0, 1}), exact.sigma({0, 0, 1}), 1e-6);
+  EXPECT_NEAR(lobe.sigma({0, 0, -1.0000001f}), exact.sigma({0, 0, 1}), 1e-6);
+  EXPECT_NEAR(lobe.sigma({1, 0, 0}), exact.sigma({1, 0, 0}), 1e-6);
+  EXPECT_FALSE(lobe.sigma(vec3(nan)) < 0);
+  EXPECT_FALSE(lobe.shadowed_sigma(vec3(nan), SymMat3::identity()) < 0);
+}
+
 TEST(TrigLobe, NormalsFollowTheDistribution) {
   Rng rng(8);
   for (const LobeKind kind : kKinds) {
