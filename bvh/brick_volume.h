@@ -49,8 +49,8 @@ inline RayRange clip_to_box(const LocalRay& ray, const Box3& box) {
 
 /// No NaN, no infinity, and nothing beyond what Embree takes (1.8e18). Zero directions are traceable.
 inline bool is_traceable(const LocalRay& ray) {
-  const vec3 size = glm::abs(ray.origin) + glm::abs(ray.direction);
-  return size.x + size.y + size.z <= 1.8e18f;
+  const auto size = [](const vec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); };  // glm::abs branches
+  return size(ray.origin) + size(ray.direction) <= 1.8e18f;
 }
 
 /// The microflake volume of a level, as rays see it. Refers to the level's arrays. Immutable; any thread.

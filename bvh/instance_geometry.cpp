@@ -154,47 +154,45 @@ struct InstanceGeometry::Visit {
   LevelChoice choice;
 };
 
-std::optional<InstanceGeometry::Visit> InstanceGeometry::enter(uint32_t instance, const RTCRay& ray,
-                                                               const RayContext& context) const {
+/// Fills in `visit`. False: the ray passes by.
+bool InstanceGeometry::enter(uint32_t instance, const RTCRay& ray, const RayContext& context, Visit& visit) const {
   const InstanceRecord& record = instances[instance];
   const TracedAsset& asset = *assets[record.asset];
-  const LocalRay local{record.point_to_local(origin_of(ray)), record.vector_to_local(direction_of(ray)), ray.tnear,
-                       ray.tfar};
-  if (!is_traceable(local)) return std::nullopt;
-  const RayRange range = clip_to_box(local, asset.bounds);
-  if (!(range.t_near * (1.0f - kRangePad) <= range.t_far * (1.0f + kRangePad))) return std::nullopt;
+  visit.ray = {record.point_to_local(origin_of(ray)), record.vector_to_local(direction_of(ray)), ray.tnear, ray.tfar};
+  if (!is_traceable(visit.ray)) return false;
+  const RayRange range = clip_to_box(visit.ray, asset.bounds);
+  if (!(range.t_near * (1.0f - kRangePad) <= range.t_far * (1.0f + kRangePad))) return false;
 
-  const LevelChoice choice = choose_level(asset, record.footprint, instance, context, range.t_near, forced_lambda);
-  const TracedLevel* level = asset.loaded[choice.slot].load(std::memory_order_acquire);
-  if (!level) level = source_.serve(record.asset, choice.slot);
-  if (!level) return std::nullopt;
-  return Visit{local, level, choice};
+  visit.choice = choose_level(asset, record.footprint, instance, context, range.t_near, forced_lambda);
+  visit.level = asset.loaded[visit.choice.slot].load(std::memory_order_acquire);
+  if (!visit.level) visit.level = source_.serve(record.asset, visit.choice.slot);
+  return visit.level != nullptr;
 }
 
 bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, RTCRayHit& ray_hit, const RayContext& context,
                                  RTCIntersectContext* embree_context, HitRecord* record) const {
-  const std::optional<Visit> visit = enter(instance, ray_hit.ray, context);
-  if (!visit) return false;
+  Visit visit;
+  if (!enter(instance, ray_hit.ray, context, visit)) return false;
   RTCRay& ray = ray_hit.ray;
   RTCHit& hit = ray_hit.hit;
 
   bool on_surface = false;
-  if (visit->level->scene.handle()) {
-    const InLocalSpace scope(ray, visit->ray);
-    on_surface = intersect_surface(visit->level->scene.handle(), embree_context, ray_hit);
+  if (visit.level->scene.handle()) {
+    const InLocalSpace scope(ray, visit.ray);
+    on_surface = intersect_surface(visit.level->scene.handle(), embree_context, ray_hit);
   }
   std::optional<VolumeHit> collision;
-  if (!visit->level->volume.is_empty()) {
-    LocalRay up_to_surface = visit->ray;
+  if (!visit.level->volume.is_empty()) {
+    LocalRay up_to_surface = visit.ray;
     up_to_surface.t_far = ray.tfar;
-    collision = visit->level->volume.first_collision(up_to_surface, flight_seed(context, instance));
+    collision = visit.level->volume.first_collision(up_to_surface, flight_seed(context, instance));
   }
   if (!on_surface && !collision) return false;
 
   HitRecord made;
   made.instance = instance;
-  made.level_slot = static_cast<uint8_t>(visit->level->slot);
-  made.lambda = visit->choice.lambda;
+  made.level_slot = static_cast<uint8_t>(visit.level->slot);
+  made.lambda = visit.choice.lambda;
   vec3 normal_world(0.0f);
   if (collision) {
     ray.tfar = collision->t;
@@ -218,15 +216,15 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, RTCRay
 
 bool InstanceGeometry::occluded(uint32_t instance, RTCRay& ray, const RayContext& context,
                                 RTCIntersectContext* embree_context) const {
-  const std::optional<Visit> visit = enter(instance, ray, context);
-  if (!visit) return false;
-  if (visit->level->scene.handle()) {
-    const InLocalSpace scope(ray, visit->ray);
-    rtcOccluded1(visit->level->scene.handle(), embree_context, &ray);
+  Visit visit;
+  if (!enter(instance, ray, context, visit)) return false;
+  if (visit.level->scene.handle()) {
+    const InLocalSpace scope(ray, visit.ray);
+    rtcOccluded1(visit.level->scene.handle(), embree_context, &ray);
     if (ray.tfar < 0.0f) return true;
   }
-  const BrickVolume& volume = visit->level->volume;
-  if (volume.is_empty() || !volume.first_collision(visit->ray, flight_seed(context, instance))) return false;
+  const BrickVolume& volume = visit.level->volume;
+  if (volume.is_empty() || !volume.first_collision(visit.ray, flight_seed(context, instance))) return false;
   ray.tfar = -kInfinity;
   return true;
 }

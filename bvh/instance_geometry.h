@@ -69,7 +69,7 @@ class InstanceGeometry {
   static void occluded_callback(const RTCOccludedFunctionNArguments* args);
 
   struct Visit;
-  std::optional<Visit> enter(uint32_t instance, const RTCRay& ray, const RayContext& context) const;
+  bool enter(uint32_t instance, const RTCRay& ray, const RayContext& context, Visit& visit) const;
   bool intersect(uint32_t instance, unsigned geometry_id, RTCRayHit& ray_hit, const RayContext& context,
                  RTCIntersectContext* embree_context, HitRecord* record) const;
   bool occluded(uint32_t instance, RTCRay& ray, const RayContext& context, RTCIntersectContext* embree_context) const;
