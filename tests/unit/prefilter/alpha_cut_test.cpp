@@ -8,6 +8,7 @@
 #include <map>
 #include <random>
 
+#include "base/parallel.h"
 #include "gltf_files.h"
 #include "png_files.h"
 #include "prefilter/import.h"
@@ -215,10 +216,17 @@ TEST(AlphaCut, SameMeshForAnyNumberOfThreads) {
   std::vector<std::array<uint8_t, 4>> texels;
   for (int i = 0; i < 64 * 64; ++i) texels.push_back({200, 100, 50, static_cast<uint8_t>((i * 37 / 64) % 256)});
   const auto file = write_strip(folder, 9, png(64, 64, texels));
-  const auto first = import_asset(file), second = import_asset(file);
+  const auto with_threads = [&](int threads) {
+    const ThreadLimit limit(threads);
+    return import_asset(file);
+  };
+  const auto first = with_threads(1), second = with_threads(4);
   ASSERT_TRUE(first && second);
   EXPECT_EQ(first->surface.positions, second->surface.positions);
   EXPECT_EQ(first->surface.triangles, second->surface.triangles);
+  for (size_t i = 0; i < first->surface.materials.size(); ++i) {
+    ASSERT_EQ(first->surface.materials[i].diffuse, second->surface.materials[i].diffuse) << i;
+  }
   EXPECT_EQ(first->source_hash, second->source_hash);
 }
 
