@@ -22,10 +22,8 @@
 namespace farfield {
 namespace {
 
-/// Rays start within 1/2 + 3 sigma = 2.3 voxels of a voxel's centre along each axis, rarely so far along two of them,
-/// and are 1 voxel long. From further off than this a plane is hit by less than 1 ray in 1500, and all that is cut off
-/// makes less than 1/1000 of all hits.
-constexpr double kReach = 2.8;
+/// Rays start in the voxel and are 1 voxel long: 1.5 voxels along an axis, rarely so far along two of them.
+constexpr double kReach = 1.5;
 /// Voxels that touch one with geometry. The others see 1/20 of the hits of one with geometry, or less: for the least
 /// noise in a sum, rays in proportion to the square root of that.
 constexpr double kNearReach = 1;
@@ -89,7 +87,8 @@ struct HitSums {
   }
 };
 
-/// The origins and directions of thesis algorithm 1, in voxels around a voxel's centre, from 128 random bits per ray.
+/// The origins (of the cube kernel, docs/decisions/0008) and directions of thesis algorithm 1, in voxels around a
+/// voxel's centre, from 128 random bits per ray.
 class RaySampler {
  public:
   static const RaySampler& instance() {
@@ -97,9 +96,10 @@ class RaySampler {
     return sampler;
   }
 
-  /// Origin: uniform in the unit cube plus a Gaussian of sigma 0.6. 21 bits per axis.
+  /// Uniform in the unit cube, 21 bits per axis.
   vec3 origin(uint64_t bits) const {
-    return {offset(bits & 0x1fffff), offset(bits >> 21 & 0x1fffff), offset(bits >> 42 & 0x1fffff)};
+    const auto offset = [](uint64_t b) { return (static_cast<float>(b & 0x1fffff) + 0.5f) * 0x1p-21f - 0.5f; };
+    return {offset(bits), offset(bits >> 21), offset(bits >> 42)};
   }
   /// Uniform on the sphere. The azimuth is one of 4096: far finer than what 200 rays can tell.
   vec3 direction(uint64_t bits) const {
@@ -112,40 +112,12 @@ class RaySampler {
   static constexpr int kCells = 4096;
 
   RaySampler() {
-    for (int i = 0; i <= kCells; ++i) {
-      const double clipped = std::clamp(i / double(kCells), 0.1 / kCells, 1 - 0.1 / kCells);  // 4 sigma
-      quantile_[static_cast<size_t>(i)] = static_cast<float>(find_quantile(clipped));
-    }
     for (int i = 0; i < kCells; ++i) {
       const double angle = 2 * M_PI * (i + 0.5) / kCells;
       circle_[static_cast<size_t>(i)] = vec2(std::cos(angle), std::sin(angle));
     }
   }
 
-  /// P(u + 0.6 g < x) for u uniform in (-1/2, 1/2) and g normal: the mean of the normal distribution over an interval.
-  static double cumulative(double x) {
-    constexpr double kSigma = 0.6;
-    const auto integral = [](double t) {  // of the cumulative normal distribution
-      return t * 0.5 * std::erfc(-t / M_SQRT2) + std::exp(-0.5 * t * t) / std::sqrt(2 * M_PI);
-    };
-    return kSigma * (integral((x + 0.5) / kSigma) - integral((x - 0.5) / kSigma));
-  }
-  static double find_quantile(double p) {
-    double lower = -5, upper = 5;
-    for (int i = 0; i < 60; ++i) {
-      const double middle = 0.5 * (lower + upper);
-      (cumulative(middle) < p ? lower : upper) = middle;
-    }
-    return lower;
-  }
-
-  /// The quantile function from its table: 12 bits choose the cell, 9 the place in it.
-  float offset(uint64_t bits) const {
-    const size_t cell = bits >> 9;
-    return quantile_[cell] + (quantile_[cell + 1] - quantile_[cell]) * (static_cast<float>(bits & 0x1ff) + 0.5f) / 512;
-  }
-
-  std::array<float, kCells + 1> quantile_;
   std::array<vec2, kCells> circle_;
 };
 

@@ -61,47 +61,38 @@ FlakeModel<kChannels>::FlakeModel(const FlakeParams& params, const vec3& wo) : w
     diffuse_ /= excess, transmission_ /= excess;
   }
   [[maybe_unused]] vec3 mean_fresnel(0.0f);
-  if constexpr (kHasSpecular || kHasMultiple) {
-    const bool has_specular = kHasSpecular && max_component(params.specular) > 0;
-    const bool has_multiple = kHasMultiple && params.self_shadowing < 1;
-    const vec3 eigen = has_specular || has_multiple ? vec3(eigenvalues(s)) : vec3(1.0f);
-    if constexpr (kHasSpecular) mean_fresnel = couple_to_specular(params, s, eigen);
-    if constexpr (kHasMultiple) set_up_multiple(params, eigen, mean_fresnel);
-  }
+  if constexpr (kHasSpecular) mean_fresnel = set_up_specular(params, s);
+  if constexpr (kHasMultiple) set_up_multiple(params, vec3(eigenvalues(s)), mean_fresnel);
 
   const float single = chances_.specular + chances_.diffuse + chances_.transmission;
   const float share = single > 0 ? single_share() / single : 0.0f;
   chances_.specular *= share, chances_.diffuse *= share, chances_.transmission *= share;
 }
 
-// Sets up the specular flakes and takes from the others what they reflect; returns their mean reflectance.
+// Returns the mean reflectance of the specular lobe.
 template <unsigned kChannels>
-vec3 FlakeModel<kChannels>::couple_to_specular(const FlakeParams& params, const SymMat3& s,
-                                               const vec3& eigen) requires(kHasSpecular) {
+vec3 FlakeModel<kChannels>::set_up_specular(const FlakeParams& params, const SymMat3& s) requires(kHasSpecular) {
   const vec3 f0 = clamp_albedo(params.specular);
   const float f90 = grazing_reflectance(f0);
   if (!(f90 > 0)) return vec3(0.0f);
   const float roughness2 = params.roughness2 < 1.0f ? std::max(params.roughness2, 0.0f) : 1.0f;
-  // sigma^2 / sigma'^2 = 1 / ((1 - r) + r tr(S) / sigma^2) is largest where sigma^2 is lambda_max.
-  const float scale = 1.0f / ((1.0f - roughness2) + roughness2 * s.trace() / eigen.x);
-  specular_ = {cholesky(specular_sggx(s, roughness2) * scale), f0, f90};
+  specular_ = {cholesky(specular_sggx(s, roughness2)), f0, roughness2};
 
   const vec3 mean = mean_schlick(f0, f90);
-  const vec3 left = glm::max(vec3(1e-6f), vec3(1.0f) - mean);
+  const float left = 1.0f - min_component(mean);
   chances_.specular = max_component(mean);
-  chances_.diffuse *= max_component(left), chances_.transmission *= max_component(left);
-  if constexpr (kHasDiffuse) diffuse_ /= left;
-  if constexpr (kHasTransmission) transmission_ /= left;
+  chances_.diffuse *= left, chances_.transmission *= left;
   return mean;
 }
 
-// The diffuse albedos are those of flakes already divided by 1 - mean F.
 template <unsigned kChannels>
 void FlakeModel<kChannels>::set_up_multiple(const FlakeParams& params, const vec3& eigen,
                                             const vec3& mean_fresnel) requires(kHasMultiple) {
   if (!(params.self_shadowing < 1)) return;
-  const vec3 left = glm::max(vec3(1e-6f), vec3(1.0f) - mean_fresnel);
-  multiple_.albedo = mean_fresnel + left * left * (base_albedo(false) + base_albedo(true));
+  vec3 base(0.0f);
+  if constexpr (kHasDiffuse) base += diffuse_;
+  if constexpr (kHasTransmission) base += transmission_;
+  multiple_.albedo = mean_fresnel + (vec3(1.0f) - mean_fresnel) * base;
   if (!(max_component(multiple_.albedo) > 0)) return;
   multiple_.norm = 1.0f / (4.0f * kPi * carlson_rg(eigen.x, eigen.y, eigen.z));
   multiple_.share = 1.0f - std::max(params.self_shadowing, 0.0f);
@@ -114,53 +105,23 @@ float FlakeModel<kChannels>::single_share() const {
   return 1.0f;
 }
 
+// One of the flakes visible from wo, as the flat surface that it is.
 template <unsigned kChannels>
-vec3 FlakeModel<kChannels>::base_albedo(bool through) const {
-  if (through) {
-    if constexpr (kHasTransmission) return transmission_;
-  } else {
-    if constexpr (kHasDiffuse) return diffuse_;
-  }
-  return vec3(0.0f);
-}
-
-// g(wi): what makes the specular lobe reciprocal.
-template <unsigned kChannels>
-float FlakeModel<kChannels>::masking(const vec3& wi) const requires(kHasSpecular) {
-  return std::min(1.0f, Sggx(flakes_).sigma(wi) / Sggx(specular_.flakes).sigma(wi));
-}
-
-// c(wo) c(wi) of one flake, but for 1 / (1 - mean F), which the albedos hold.
-template <unsigned kChannels>
-vec3 FlakeModel<kChannels>::coupling([[maybe_unused]] const vec3& flake, [[maybe_unused]] float cos_i) const {
-  if constexpr (kHasSpecular) {
-    if (specular_.f90 > 0) {
-      const vec3 out = vec3(1.0f) - schlick(specular_.f0, specular_.f90, glm::dot(flake, wo_));
-      const vec3 in = vec3(1.0f) - schlick(specular_.f0, specular_.f90, cos_i);
-      return out * in;
-    }
-  }
-  return vec3(1.0f);
+typename FlakeModel<kChannels>::Flake FlakeModel<kChannels>::sample_flake(Rng& rng) const {
+  const float u1 = rng.next(), u2 = rng.next();
+  const vec3 m = Sggx(flakes_).sample_visible(wo_, u1, u2);
+  SurfaceParams params;
+  params.sggx = SymMat3::outer(m);
+  if constexpr (kHasDiffuse) params.diffuse = diffuse_;
+  if constexpr (kHasTransmission) params.transmission = transmission_;
+  if constexpr (kHasSpecular) params.specular = specular_.f0, params.roughness2 = specular_.roughness2;
+  return Flake(params, m, wo_);
 }
 
 template <unsigned kChannels>
 vec3 FlakeModel<kChannels>::eval(const vec3& wi, [[maybe_unused]] Rng& rng) const {
-  vec3 single(0.0f);
-  if constexpr (kHasSpecular) {
-    if (chances_.specular > 0) {
-      const float cos_h = glm::dot(half_vector(wo_, wi), wo_);
-      single +=
-          schlick(specular_.f0, specular_.f90, cos_h) * (Sggx(specular_.flakes).specular_phase(wo_, wi) * masking(wi));
-    }
-  }
-  if constexpr (kHasBase) {
-    if (chances_.diffuse + chances_.transmission > 0) {
-      const vec3 flake = Sggx(flakes_).sample_visible(wo_, rng.next(), rng.next());
-      const float c = glm::dot(flake, wi), cos_i = std::abs(c);
-      single += base_albedo(c < 0) * coupling(flake, cos_i) * (cos_i * kInvPi);
-    }
-  }
-  vec3 value = single_share() * single;
+  vec3 value(0.0f);
+  if (scatters_once()) value = single_share() * sample_flake(rng).eval(wi, rng);
   if constexpr (kHasMultiple) {
     value += multiple_.share * multiple_.norm * Sggx(flakes_).sigma(wi) * multiple_.albedo;
   }
@@ -171,7 +132,7 @@ template <unsigned kChannels>
 float FlakeModel<kChannels>::pdf(const vec3& wi) const {
   float density = 0;
   if constexpr (kHasSpecular) {
-    if (chances_.specular > 0) density += chances_.specular * Sggx(specular_.flakes).specular_phase(wo_, wi);
+    if (chances_.specular > 0) density += chances_.specular * Sggx(specular_.facets).specular_phase(wo_, wi);
   }
   if constexpr (kHasDiffuse) {
     if (chances_.diffuse > 0) density += chances_.diffuse * diffuse_density(flakes_, wo_, wi);
@@ -185,36 +146,18 @@ float FlakeModel<kChannels>::pdf(const vec3& wi) const {
 
 template <unsigned kChannels>
 ScatterResult FlakeModel<kChannels>::sample(Rng& rng) const {
-  const Chances& p = chances_;
-  float u = rng.next();
   ScatterResult result;
   if constexpr (kHasMultiple) {
-    if (u < p.multiple) {
+    if (rng.next() < chances_.multiple) {
       result.wi = Sggx(flakes_).sample_sigma(rng);
       result.weight = multiple_.albedo;  // chosen with probability 1 - A, which is its share
       result.pdf = pdf(result.wi);
       return result;
     }
-    u -= p.multiple;
   }
-  if constexpr (kHasSpecular) {
-    if (u < p.specular) {
-      const vec3 flake = Sggx(specular_.flakes).sample_visible(wo_, rng.next(), rng.next());
-      result.wi = reflect_about(wo_, flake);
-      result.weight = schlick(specular_.f0, specular_.f90, glm::dot(flake, wo_)) *
-                      (single_share() / p.specular * masking(result.wi));
-      result.pdf = pdf(result.wi);
-      return result;
-    }
-    u -= p.specular;
-  }
-  if (!(p.diffuse + p.transmission > 0)) return {};
-  const vec3 flake = Sggx(flakes_).sample_visible(wo_, rng.next(), rng.next());
-  const bool through = p.transmission > 0 && !(u < p.diffuse);
-  result.wi = cosine_lobe(through ? -flake : flake, rng.next(), rng.next());
-  result.weight = base_albedo(through) * coupling(flake, std::abs(glm::dot(flake, result.wi))) *
-                  (single_share() / (through ? p.transmission : p.diffuse));
-  result.pdf = pdf(result.wi);
+  if (!scatters_once()) return {};
+  result = sample_flake(rng).sample(rng);  // chosen with probability A, which is its share
+  if (result.pdf > 0) result.pdf = pdf(result.wi);
   return result;
 }
 

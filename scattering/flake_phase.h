@@ -4,13 +4,11 @@
 //
 // With A = self_shadowing, sigma(w) = sqrt(w^T S w), and m the flakes of sggx visible from wo:
 //
-//   A (specular + diffuse + transmission) + (1 - A) albedo_ms sigma(wi) / (4 pi R_G)
-//   specular      F D'(h) g(wi) / (4 sigma'(wo)),  ' = of specular_sggx(sggx, roughness2), g = sigma / sigma', scaled
-//   to
-//                 max g = 1: a masking factor, which makes sigma(wo) f(wo, wi) symmetric; 1 if roughness2 = 0
-//   diffuse       E_m [ diffuse c(wo) c(wi) <wi.m> / pi ],  c(w) = (1 - F(w.m)) / sqrt(1 - mean F), F Schlick's Fresnel
-//   transmission  the same with <-wi.m>
-//   albedo_ms     mean F + (1 - mean F)(diffuse + transmission): what a flake reflects of light from everywhere
+//   A E_m[ f_m(wo, wi) |wi.m| ] + (1 - A) albedo_ms sigma(wi) / (4 pi R_G)
+//
+// f_m is the BRDF (and transmission) of a flat surface with normal m and the voxel's reflectance: a flake scatters as
+// the piece of surface that it stands for, grazing and masking losses included (docs/decisions/0007).
+// albedo_ms = mean F + (1 - mean F)(diffuse + transmission): what a flake reflects of light from everywhere.
 //
 // Reciprocal in the sense of anisotropic media, sigma(wo) f(wo, wi) = sigma(wi) f(wi, wo); the integral over wi is at
 // most 1, and exactly 1 where diffuse + transmission = 1 and specular = 0.
@@ -21,6 +19,7 @@
 #include "scattering/channels.h"
 #include "scattering/scatter_sample.h"
 #include "scattering/sggx.h"
+#include "scattering/surface_bsdf.h"
 #include "scattering/sym_mat3.h"
 
 namespace farfield {
@@ -43,12 +42,12 @@ template <unsigned kChannels>
 class FlakeModel {
  public:
   FlakeModel(const FlakeParams& params, const vec3& wo);
-  /// albedo * phase function; an unbiased one-sample estimate for diffuse flakes (rng).
+  /// albedo * phase function; an unbiased one-sample estimate (rng chooses the flake).
   vec3 eval(const vec3& wi, Rng& rng) const;
   /// The density that multiple importance sampling uses for sample(), per steradian: normalised, and close to the
-  /// density of sample(). It is exact for specular, flat, isotropic and multiple scattering; between those, diffuse
-  /// flakes have no closed form. Weights made from it sum to one, so estimates stay unbiased as long as `weight` below
-  /// is used.
+  /// density of sample(). It is exact for mirrors, for flat and for isotropic diffuse flakes, and for multiple
+  /// scattering; the rest has no closed form. Weights made from it sum to one, so estimates stay unbiased as long as
+  /// `weight` below is used.
   float pdf(const vec3& wi) const;
   /// weight = albedo * phase / true density of the sample (albedo itself for white diffuse flakes); `pdf` = pdf(wi).
   ScatterResult sample(Rng& rng) const;
@@ -62,9 +61,9 @@ class FlakeModel {
 
   /// What only specular flakes need.
   struct Specular {
-    CholeskyFactor<float> flakes;  ///< scaled so that g <= 1; valid if f90 > 0
-    vec3 f0{0.0f};
-    float f90 = 0;  ///< 0: these flakes have no specular lobe
+    CholeskyFactor<float> facets;  ///< of specular_sggx(sggx, roughness2), for pdf()
+    vec3 f0{0.0f};                 ///< 0: these flakes have no specular lobe
+    float roughness2 = 1;
   };
   /// What only self-shadowing needs.
   struct Multiple {
@@ -72,17 +71,18 @@ class FlakeModel {
     float norm = 0;   ///< 1 / (4 pi R_G)
     float share = 0;  ///< 1 - A
   };
-  /// How often sample() picks each kind of event.
+  /// How often each kind of event is expected.
   struct Chances {
     float specular = 0, diffuse = 0, transmission = 0, multiple = 0;
   };
 
-  vec3 couple_to_specular(const FlakeParams& params, const SymMat3& s, const vec3& eigen) requires(kHasSpecular);
+  using Flake = SurfaceModel<kChannels&(kDiffuse | kSpecular | kTransmission)>;
+
+  vec3 set_up_specular(const FlakeParams& params, const SymMat3& s) requires(kHasSpecular);
   void set_up_multiple(const FlakeParams& params, const vec3& eigen, const vec3& mean_fresnel) requires(kHasMultiple);
   float single_share() const;
-  float masking(const vec3& wi) const requires(kHasSpecular);
-  vec3 coupling(const vec3& flake, float cos_i) const;
-  vec3 base_albedo(bool through) const;
+  bool scatters_once() const { return chances_.specular + chances_.diffuse + chances_.transmission > 0; }
+  Flake sample_flake(Rng& rng) const;
 
   CholeskyFactor<float> flakes_;
   vec3 wo_;

@@ -70,13 +70,14 @@ TEST(FlakePhase, WhiteLeavesLoseNothing) {
   }
 }
 
+// All but what the smallest roughness of a surface (alpha = 0.001) masks where a flake is seen edge on.
 TEST(FlakePhase, MirrorFlakesLoseNothing) {
   Rng rng(4);
   for (const NamedSggx& s : sample_sggx()) {
     FlakeParams p;
     p.sggx = s.sggx, p.specular = vec3(1.0f), p.roughness2 = 0;
     const FlakePhase phase(p, vec3(random_direction(rng)));
-    for (int i = 0; i < 200; ++i) EXPECT_NEAR(phase.sample(rng).weight.x, 1, 2e-3) << s.name;
+    for (int i = 0; i < 200; ++i) EXPECT_NEAR(phase.sample(rng).weight.x, 1, 2e-2) << s.name;
   }
 }
 
@@ -152,7 +153,7 @@ TEST(FlakePhase, SamplesFollowPdfWherePdfIsExact) {
   Rng rng(11);
   for (const NamedSggx& s : sample_sggx()) {
     FlakeParams p;
-    p.sggx = s.sggx, p.specular = vec3(0.8f), p.roughness2 = 0.3f, p.self_shadowing = 0.4f;
+    p.sggx = specular_sggx(s.sggx, 0.3f), p.specular = vec3(0.8f), p.roughness2 = 0, p.self_shadowing = 0.4f;
     const FlakePhase phase(p, vec3(random_direction(rng)));
     const double p_value = chi_square_p_value([&](Rng& r) { return dvec3(phase.sample(r).wi); },
                                               [&](const dvec3& w) { return double(phase.pdf(vec3(w))); });
@@ -163,6 +164,31 @@ TEST(FlakePhase, SamplesFollowPdfWherePdfIsExact) {
   EXPECT_GT(chi_square_p_value([&](Rng& r) { return dvec3(phase.sample(r).wi); },
                                [&](const dvec3& w) { return double(phase.pdf(vec3(w))); }),
             kSignificance);
+}
+
+// What voxelisation relies on: flakes in all orientations reflect as much light, and as much of it back and forth, as
+// flat faces in all orientations. 200000 samples each, within 5 standard errors.
+TEST(FlakePhase, FlakesScatterLikeTheFacesTheyStandFor) {
+  const vec3 wo(0, 0, 1);
+  for (const float roughness2 : {0.0f, 0.06f, 0.3f, 1.0f}) {
+    const FlakeParams p = glossy_leaf(SymMat3::identity(), roughness2, 1.0f);
+    const FlakePhase phase(p, wo);
+    const auto by_side = [](const ScatterResult& r) {
+      return r.weight.y * vec3(1.0f, r.wi.z > 0.5f ? 1.0f : 0.0f, r.wi.z < -0.5f ? 1.0f : 0.0f);
+    };
+    const Mean flakes = mean_of(200000, 16, [&](Rng& r) { return by_side(phase.sample(r)); });
+    // Faces are seen in proportion to their cosine, whose mean over orientations is 1/2.
+    const Mean faces = mean_of(200000, 17, [&](Rng& r) {
+      vec3 n(random_direction(r));
+      if (n.z < 0) n = -n;
+      const SurfaceParams face{SymMat3::outer(n), p.diffuse, p.specular, p.transmission, roughness2};
+      return 2.0f * n.z * by_side(SurfaceBsdf(face, n, wo).sample(r));
+    });
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(flakes.value[c], faces.value[c], 5 * (flakes.standard_error[c] + faces.standard_error[c]))
+          << roughness2 << ' ' << c;
+    }
+  }
 }
 
 TEST(FlakePhase, PdfIsNormalised) {
