@@ -50,21 +50,6 @@ Image select_channels(const Image& image, const std::vector<std::string>& names)
   return result;
 }
 
-Image composite_over(const Image& image, const vec3& color) {
-  const int alpha = image.find_channel("A");
-  Image result = image;
-  if (alpha < 0) return result;
-  const std::array<int, 3> rgb = rgb_channels(image);
-  for (int y = 0; y < image.height; ++y) {
-    for (int x = 0; x < image.width; ++x) {
-      float* pixel = result.pixel(x, y);
-      for (int c = 0; c < 3; ++c)
-        if (rgb[c] >= 0) pixel[rgb[c]] += (1.0f - pixel[alpha]) * color[c];
-    }
-  }
-  return result;
-}
-
 Image downsample(const Image& image, int n) {
   FARFIELD_CHECK(n >= 1);
   Image small(divide_up(image.width, n), divide_up(image.height, n), image.channels);

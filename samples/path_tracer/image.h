@@ -60,9 +60,6 @@ Result<void> write_png(const std::filesystem::path& path, const Image& image, co
 /// The named channels alone, in this order; those that the image lacks are 0.
 Image select_channels(const Image& image, const std::vector<std::string>& names);
 
-/// R, G, B of a premultiplied image over a colour: rgb + (1 - A) color. Without A the image as it is.
-Image composite_over(const Image& image, const vec3& color);
-
 /// The image at 1/n of its size by averaging n x n pixels; blocks at the right and lower edge may be partial. n >= 1.
 Image downsample(const Image& image, int n);
 

@@ -175,13 +175,6 @@ TEST(Downsample, KeepsTheMeanAndHandlesPartialBlocks) {
   EXPECT_EQ(downsample(image, 100).values, (std::vector<float>{7}));
 }
 
-TEST(CompositeOver, AddsWhatAlphaLetsThrough) {
-  Image image(1, 1, {"R", "G", "B", "A"});
-  image.values = {0.5f, 0.25f, 0.0f, 0.75f};
-  const Image over = composite_over(image, {1, 2, 4});
-  EXPECT_EQ(over.values, (std::vector<float>{0.75f, 0.75f, 1.0f, 0.75f}));
-}
-
 TEST(SelectChannels, ReordersAndFillsWithZero) {
   Image image(2, 1, {"A", "R"});
   image.values = {1, 2, 3, 4};
