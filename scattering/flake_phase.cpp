@@ -148,7 +148,7 @@ template <unsigned kChannels>
 ScatterResult FlakeModel<kChannels>::sample(Rng& rng) const {
   ScatterResult result;
   if constexpr (kHasMultiple) {
-    if (rng.next() < chances_.multiple) {
+    if (chances_.multiple > 0 && rng.next() < chances_.multiple) {
       result.wi = Sggx(flakes_).sample_sigma(rng);
       result.weight = multiple_.albedo;  // chosen with probability 1 - A, which is its share
       result.pdf = pdf(result.wi);
