@@ -32,7 +32,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint32_t kMaxGrid = 4096;       ///< the brick table has (grid / 8)^3 entries
-constexpr uint32_t kVoxelizeVersion = 1;  ///< goes up when voxelize() or pack_volume() give other results
+constexpr uint32_t kVoxelizeVersion = 2;  ///< goes up when voxelize() or pack_volume() give other results
 
 /// Seconds since it was made.
 class Stopwatch {
@@ -59,8 +59,8 @@ Result<void> check_options(const BakeOptions& options) {
 /// Equal text and source hash give equal bytes.
 std::string canonical_options(const BakeOptions& options) {
   if (options.source_only) return fmt::format("source_only=1 mesh={}", options.import.mesh);
-  return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} mesh={}", options.finest_grid,
-                     options.coarsest_grid, options.rays_per_voxel, options.import.mesh);
+  return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} mesh={} voxelize={}", options.finest_grid,
+                     options.coarsest_grid, options.rays_per_voxel, options.import.mesh, kVoxelizeVersion);
 }
 
 /// The manifest of `out`, if it is whole and was baked from the same source with the same options by this version.

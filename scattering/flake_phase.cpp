@@ -62,7 +62,7 @@ FlakeModel<kChannels>::FlakeModel(const FlakeParams& params, const vec3& wo) : w
   }
   [[maybe_unused]] vec3 mean_fresnel(0.0f);
   if constexpr (kHasSpecular) mean_fresnel = set_up_specular(params, s);
-  if constexpr (kHasMultiple) set_up_multiple(params, vec3(eigenvalues(s)), mean_fresnel);
+  if constexpr (kHasMultiple) set_up_multiple(params, s, mean_fresnel);
 
   const float single = chances_.specular + chances_.diffuse + chances_.transmission;
   const float share = single > 0 ? single_share() / single : 0.0f;
@@ -86,7 +86,7 @@ vec3 FlakeModel<kChannels>::set_up_specular(const FlakeParams& params, const Sym
 }
 
 template <unsigned kChannels>
-void FlakeModel<kChannels>::set_up_multiple(const FlakeParams& params, const vec3& eigen,
+void FlakeModel<kChannels>::set_up_multiple(const FlakeParams& params, const SymMat3& s,
                                             const vec3& mean_fresnel) requires(kHasMultiple) {
   if (!(params.self_shadowing < 1)) return;
   vec3 base(0.0f);
@@ -94,6 +94,7 @@ void FlakeModel<kChannels>::set_up_multiple(const FlakeParams& params, const vec
   if constexpr (kHasTransmission) base += transmission_;
   multiple_.albedo = mean_fresnel + (vec3(1.0f) - mean_fresnel) * base;
   if (!(max_component(multiple_.albedo) > 0)) return;
+  const vec3 eigen(eigenvalues(s));
   multiple_.norm = 1.0f / (4.0f * kPi * carlson_rg(eigen.x, eigen.y, eigen.z));
   multiple_.share = 1.0f - std::max(params.self_shadowing, 0.0f);
   chances_.multiple = multiple_.share;

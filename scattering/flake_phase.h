@@ -79,7 +79,7 @@ class FlakeModel {
   using Flake = SurfaceModel<kChannels&(kDiffuse | kSpecular | kTransmission)>;
 
   vec3 set_up_specular(const FlakeParams& params, const SymMat3& s) requires(kHasSpecular);
-  void set_up_multiple(const FlakeParams& params, const vec3& eigen, const vec3& mean_fresnel) requires(kHasMultiple);
+  void set_up_multiple(const FlakeParams& params, const SymMat3& s, const vec3& mean_fresnel) requires(kHasMultiple);
   float single_share() const;
   bool scatters_once() const { return chances_.specular + chances_.diffuse + chances_.transmission > 0; }
   Flake sample_flake(Rng& rng) const;
