@@ -24,8 +24,8 @@ namespace {
 
 /// Rays start in the voxel and are 1 voxel long: 1.5 voxels along an axis, rarely so far along two of them.
 constexpr double kReach = 1.5;
-/// Voxels that touch one with geometry. The others see 1/20 of the hits of one with geometry, or less: for the least
-/// noise in a sum, rays in proportion to the square root of that.
+/// Voxels that touch one with geometry. The others see few hits: they get fewer rays, since the noise of a sum is least
+/// with rays in proportion to the square root of the hits.
 constexpr double kNearReach = 1;
 constexpr uint32_t kFarShare = 4;
 

@@ -27,7 +27,7 @@ namespace farfield {
 /// Scattering parameters of a voxel in the space of the directions (world). diffuse + transmission above 1 is scaled
 /// down to 1.
 struct FlakeParams {
-  SymMat3 sggx;  ///< any scale; specular flakes: specular_sggx(sggx, roughness2). 0: taken as isotropic
+  SymMat3 sggx;  ///< of the flakes, each a flat surface; any scale. 0: taken as isotropic
   vec3 diffuse{0.0f};
   vec3 specular{0.0f};  ///< F0
   vec3 transmission{0.0f};
