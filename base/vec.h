@@ -40,6 +40,7 @@ struct Box3 {
   }
 };
 
+inline float component_sum(const vec3& v) { return v.x + v.y + v.z; }
 inline float max_component(const vec3& v) { return std::max(v.x, std::max(v.y, v.z)); }
 inline float min_component(const vec3& v) { return std::min(v.x, std::min(v.y, v.z)); }
 inline bool is_finite(const vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }

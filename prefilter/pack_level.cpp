@@ -357,10 +357,13 @@ LevelData pack_volume(const SparseVolume& volume) {
   level.voxel_diffuse = pack_each<PackedColor>(voxels, [](const auto& v) { return pack_color(v.diffuse); });
   level.voxel_specular = pack_each<PackedColor>(voxels, [](const auto& v) { return pack_color(v.specular); });
   level.voxel_transmission = pack_each<PackedColor>(voxels, [](const auto& v) { return pack_color(v.transmission); });
+  level.voxel_self_shadowing =
+      pack_each<uint8_t>(voxels, [](const auto& v) { return std::max<uint8_t>(pack_unorm8(v.self_shadowing), 1); });
   drop_if_all(level.voxel_sggx, pack_flake_sggx(SymMat3::identity()));
   drop_if_all(level.voxel_diffuse, PackedColor{});
   drop_if_all(level.voxel_specular, PackedColor{});
   drop_if_all(level.voxel_transmission, PackedColor{});
+  drop_if_all(level.voxel_self_shadowing, uint8_t{255});
   if (!level.voxel_specular.empty()) {
     level.voxel_roughness2 = pack_each<uint8_t>(voxels, [](const auto& v) { return pack_unorm8(v.roughness2); });
   }

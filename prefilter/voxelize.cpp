@@ -1,23 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 // Candidates first: every triangle marks the voxels it passes through, and these are widened by the reach of a voxel's
-// rays. Then each candidate casts its rays on an Embree scene of the triangles, counts hits, averages what it hit, and
-// solves for the density that is hit as often [Loubet 2018, sections 9.2 and 9.3].
+// rays. Then each candidate casts its rays at the triangles, counts hits, averages what it hit, and solves for the
+// density that is hit as often [Loubet 2018, sections 9.2 and 9.3], and for the self-shadowing with which as much light
+// gets away as does from the points that were hit [14.1.4].
 #include "prefilter/voxelize.h"
 
-#include <embree3/rtcore.h>
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <thread>
-#include <type_traits>
 
 #include "base/hash.h"
 #include "base/parallel.h"
 #include "prefilter/density.h"
+#include "prefilter/ray_scene.h"
+#include "prefilter/self_shadowing.h"
+#include "scattering/albedo.h"
 #include "scattering/sggx.h"
+#include "scattering/warp.h"
 
 namespace farfield {
 namespace {
@@ -29,44 +30,12 @@ constexpr double kReach = 1.5;
 constexpr double kNearReach = 1;
 constexpr uint32_t kFarShare = 4;
 
+/// In voxels: light that goes on starts this far from the face it leaves.
+constexpr float kClearance = 1e-3f;
+
 constexpr uint32_t kMaxRayFactor = 16;    ///< how many times more rays than asked for a voxel may get
 constexpr uint32_t kEnoughMisses = 16;    ///< rays that must get through for a transmittance with 25 % noise
 constexpr uint64_t kManyVoxels = 50'000;  ///< fewer voxels share the rays of this many: seconds of one core
-
-struct DeleteDevice {
-  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-};
-struct DeleteScene {
-  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-};
-
-/// The triangles as an Embree scene, on a device of its own.
-class RayScene {
- public:
-  explicit RayScene(const Surface& geometry) : device_(rtcNewDevice(nullptr)), scene_(rtcNewScene(device_.get())) {
-    RTCGeometry triangles = rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
-    // Embree reads 16 bytes at each vertex, so the last one needs room behind it: a copy with one more.
-    auto* vertices = static_cast<vec3*>(rtcSetNewGeometryBuffer(triangles, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                                sizeof(vec3), geometry.positions.size()));
-    std::copy(geometry.positions.begin(), geometry.positions.end(), vertices);
-    rtcSetSharedGeometryBuffer(triangles, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, geometry.triangles.data(), 0,
-                               sizeof(uvec3), geometry.triangles.size());
-    rtcCommitGeometry(triangles);
-    rtcAttachGeometry(scene_.get(), triangles);
-    rtcReleaseGeometry(triangles);
-    // One thread: a parallel build may order triangles differently, and with them which of two equal hits is reported.
-    tbb::task_arena one_thread(1);
-    one_thread.execute([&] { rtcCommitScene(scene_.get()); });
-  }
-
-  RTCScene scene() const { return scene_.get(); }
-  /// Whether Embree could build the scene.
-  bool is_valid() const { return rtcGetDeviceError(device_.get()) == RTC_ERROR_NONE; }
-
- private:
-  std::unique_ptr<std::remove_pointer_t<RTCDevice>, DeleteDevice> device_;
-  std::unique_ptr<std::remove_pointer_t<RTCScene>, DeleteScene> scene_;
-};
 
 /// Sums over the rays of one voxel.
 struct HitSums {
@@ -81,7 +50,7 @@ struct HitSums {
     diffuse += m.diffuse;
     specular += m.specular;
     transmission += m.transmission;
-    const float weight = m.specular.x + m.specular.y + m.specular.z;
+    const float weight = component_sum(m.specular);
     roughness2_weight += weight;
     roughness2 += weight * m.roughness2;
   }
@@ -131,30 +100,56 @@ class SplitMix {
   uint64_t state_;
 };
 
-/// Casts rays of one voxel length from around `center`. What a ray hits first counts. Single rays: packets of 8 or 16
-/// are no more than 6 % faster for rays that are so short and go everywhere.
-void cast_rays(RTCScene scene, const Surface& geometry, const vec3& center, float voxel_size, uint32_t rays,
-               SplitMix& random, HitSums& sums) {
-  const RaySampler& sampler = RaySampler::instance();
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  for (uint32_t i = 0; i < rays; ++i) {
-    const vec3 origin = center + voxel_size * sampler.origin(random.next());
-    const vec3 direction = sampler.direction(random.next());
-    RTCRayHit ray;
-    ray.ray = {origin.x,    origin.y, origin.z,   0,           direction.x, direction.y,
-               direction.z, 0,        voxel_size, 0xffffffffu, 0,           0};
-    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(scene, &context, &ray);
-    if (ray.hit.geomID != RTC_INVALID_GEOMETRY_ID) sums.add(geometry.materials[ray.hit.primID]);
-  }
+/// Where light goes on that arrived along `direction` at a face: a cosine lobe on the side that it came from or, as
+/// often as the face lets light through, on the other.
+vec3 scattered_direction(const FaceMaterial& m, const vec3& geometric_normal, const vec3& direction, uint64_t bits) {
+  const auto unit = [bits](int shift) { return static_cast<float>(bits >> shift & 0x1fffff) * 0x1p-21f; };
+  const float through = component_sum(m.transmission);
+  const float back = component_sum(m.diffuse) + component_sum(m.specular);
+  const bool goes_through = unit(0) * (through + back) < through;
+  const vec3 normal = glm::normalize(geometric_normal);
+  return cosine_lobe((glm::dot(normal, direction) > 0) == goes_through ? normal : -normal, unit(21), unit(42));
 }
+
+/// What one voxel is measured with.
+struct VoxelRays {
+  const Surface& geometry;
+  const RayScene& scene;
+  vec3 center;
+  float size;  ///< of the voxel, and how far rays go
+  HitSums hits{};
+  EscapeSums escape{};
+
+  /// Casts rays from the voxel. What a ray hits first counts.
+  void cast(uint32_t rays, SplitMix& random) {
+    const RaySampler& sampler = RaySampler::instance();
+    for (uint32_t i = 0; i < rays; ++i) {
+      const vec3 origin = center + size * sampler.origin(random.next());
+      const vec3 direction = sampler.direction(random.next());
+      const auto hit = scene.first_hit(origin, direction, size);
+      if (!hit) continue;
+      hits.add(geometry.materials[hit->triangle]);
+      scatter(origin, direction, *hit, random.next());
+    }
+  }
+
+  /// Sends on the light of a hit. What is hidden from where the ray came from, within a voxel's size, does not count:
+  /// nobody sees it, and the inside of solid twigs is of that kind.
+  void scatter(const vec3& origin, const vec3& direction, const RayHit& hit, uint64_t bits) {
+    if (scene.is_occluded(origin, -direction, 0, size - hit.distance)) return;
+    const FaceMaterial& m = geometry.materials[hit.triangle];
+    const vec3 away = scattered_direction(m, hit.normal, direction, bits);
+    const vec3 point = origin + hit.distance * direction;
+    escape.add(away, component_sum(m.diffuse + m.specular + m.transmission),
+               !scene.is_occluded(point, away, kClearance * size, size));
+  }
+};
 
 /// What all voxels of a volume have in common.
 struct Measurement {
   const Surface& geometry;
   const VoxelLattice& lattice;
-  RTCScene scene;
+  const RayScene& scene;
   uint32_t rays;  ///< per voxel near geometry
   uint64_t seed;
 };
@@ -164,19 +159,32 @@ SplitMix random_of_voxel(const ivec3& coordinate, uint64_t seed) {
   return SplitMix(mix64(mix64(seed, bits(coordinate.x) << 32 | bits(coordinate.y)), bits(coordinate.z)));
 }
 
+/// Makes as much light get away from a voxel's medium as does from its geometry: less by self-shadowing, more by a
+/// higher albedo. White stays white.
+void let_escape(float ratio, Voxel& voxel) {
+  voxel.self_shadowing = std::min(ratio, 1.0f);
+  if (!(ratio > 1)) return;
+  const vec3 albedo = voxel.diffuse + voxel.specular + voxel.transmission;
+  const vec3 gain = cluster_albedo(glm::min(albedo, vec3(1.0f)), ratio) / glm::max(albedo, vec3(1e-6f));
+  voxel.diffuse *= gain;
+  voxel.specular *= gain;
+  voxel.transmission *= gain;
+}
+
 /// One voxel, or one with density 0 where no ray hits or chance has it so.
 Voxel measure_voxel(const Measurement& m, const ivec3& coordinate, bool is_near) {
   const double size = m.lattice.voxel_size;
   const vec3 center(m.lattice.origin + (dvec3(coordinate) + 0.5) * size);
   SplitMix random = random_of_voxel(coordinate, m.seed);
 
-  HitSums sums;
+  VoxelRays voxel_rays{m.geometry, m.scene, center, static_cast<float>(size)};
+  const HitSums& sums = voxel_rays.hits;
   const uint32_t first_rays = is_near ? m.rays : (m.rays + kFarShare - 1) / kFarShare;
   uint32_t rays = first_rays;
-  cast_rays(m.scene, m.geometry, center, static_cast<float>(size), rays, random, sums);
+  voxel_rays.cast(rays, random);
   // A transmittance that is the share of a handful of rays is mostly noise: cast as many rays again until it is not.
   while (rays - sums.hits < kEnoughMisses && rays < kMaxRayFactor * first_rays && sums.hits > rays / 2) {
-    cast_rays(m.scene, m.geometry, center, static_cast<float>(size), rays, random, sums);
+    voxel_rays.cast(rays, random);
     rays *= 2;
   }
   Voxel voxel;
@@ -194,6 +202,7 @@ Voxel measure_voxel(const Measurement& m, const ivec3& coordinate, bool is_near)
   voxel.specular = sums.specular * share;
   voxel.transmission = sums.transmission * share;
   if (sums.roughness2_weight > 0) voxel.roughness2 = sums.roughness2 / sums.roughness2_weight;
+  let_escape(static_cast<float>(voxel_rays.escape.ratio(voxel.sggx, voxel.density, size)), voxel);
   return voxel;
 }
 
@@ -265,8 +274,7 @@ Result<std::vector<std::vector<Voxel>>> measure_bricks(const Surface& geometry, 
   if (!rays.is_valid()) {
     return make_error(ErrorCode::Io, "voxelize: Embree could not build the geometry (out of memory?)");
   }
-  const Measurement measurement{geometry, lattice, rays.scene(), rays_per_voxel(candidates.near.size(), options),
-                                options.seed};
+  const Measurement measurement{geometry, lattice, rays, rays_per_voxel(candidates.near.size(), options), options.seed};
   const size_t count = (voxels.size() + stride - 1) / stride;
   std::atomic<size_t> done{0};  // relaxed: only for the progress
   const std::thread::id caller = std::this_thread::get_id();

@@ -24,6 +24,7 @@ struct Voxel {
   vec3 specular{0.0f};
   vec3 transmission{0.0f};
   float roughness2 = 1.0f;
+  float self_shadowing = 1.0f;  ///< A in (0, 1]; 1: none
 };
 
 /// 8^3 voxels of the lattice, from kBrickSide * coordinate upwards.

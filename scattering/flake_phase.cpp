@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scattering/flake_phase.h"
 
+#include "scattering/albedo.h"
 #include "scattering/carlson.h"
 #include "scattering/fresnel.h"
 
@@ -12,10 +13,8 @@ namespace {
 /// The isotropic share that the closed-form density keeps for flat flakes, so that it is positive all around.
 constexpr float kSmallestSpread = 0.01f;
 
-vec3 clamp_albedo(const vec3& albedo) {
-  // fmax turns NaN into 0.
-  return glm::min(vec3(std::fmax(0.0f, albedo.x), std::fmax(0.0f, albedo.y), std::fmax(0.0f, albedo.z)), vec3(1.0f));
-}
+/// Smaller A is taken as this one: white flakes must not divide 0 by 0.
+constexpr float kLeastSelfShadowing = 1e-4f;
 
 /// The cosine-weighted mean of Schlick's Fresnel.
 vec3 mean_schlick(const vec3& f0, float f90) { return f0 + (vec3(f90) - f0) * (1.0f / 21); }
@@ -56,10 +55,7 @@ FlakeModel<kChannels>::FlakeModel(const FlakeParams& params, const vec3& wo) : w
   if constexpr (kHasTransmission) {
     transmission_ = clamp_albedo(params.transmission), chances_.transmission = max_component(transmission_);
   }
-  if constexpr (kHasDiffuse && kHasTransmission) {
-    const vec3 excess = glm::max(vec3(1.0f), diffuse_ + transmission_);
-    diffuse_ /= excess, transmission_ /= excess;
-  }
+  if constexpr (kHasDiffuse && kHasTransmission) limit_sum(diffuse_, transmission_);
   [[maybe_unused]] vec3 mean_fresnel(0.0f);
   if constexpr (kHasSpecular) mean_fresnel = set_up_specular(params, s);
   if constexpr (kHasMultiple) set_up_multiple(params, s, mean_fresnel);
@@ -92,11 +88,13 @@ void FlakeModel<kChannels>::set_up_multiple(const FlakeParams& params, const Sym
   vec3 base(0.0f);
   if constexpr (kHasDiffuse) base += diffuse_;
   if constexpr (kHasTransmission) base += transmission_;
-  multiple_.albedo = mean_fresnel + (vec3(1.0f) - mean_fresnel) * base;
+  const float a = std::max(params.self_shadowing, kLeastSelfShadowing);
+  const vec3 albedo = mean_fresnel + (vec3(1.0f) - mean_fresnel) * base;
+  multiple_.albedo = albedo * cluster_albedo(albedo, a);
   if (!(max_component(multiple_.albedo) > 0)) return;
   const vec3 eigen(eigenvalues(s));
   multiple_.norm = 1.0f / (4.0f * kPi * carlson_rg(eigen.x, eigen.y, eigen.z));
-  multiple_.share = 1.0f - std::max(params.self_shadowing, 0.0f);
+  multiple_.share = 1.0f - a;
   chances_.multiple = multiple_.share;
 }
 

@@ -8,7 +8,9 @@
 //
 // f_m is the BRDF (and transmission) of a flat surface with normal m and the voxel's reflectance: a flake scatters as
 // the piece of surface that it stands for, grazing and masking losses included (docs/decisions/0007).
-// albedo_ms = mean F + (1 - mean F)(diffuse + transmission): what a flake reflects of light from everywhere.
+// With a = mean F + (1 - mean F)(diffuse + transmission), what a flake reflects of light from everywhere, albedo_ms =
+// a cluster_albedo(a, A) (scattering/albedo.h): light that meets another flake close by is coloured again. The
+// thesis stores albedo_ms per voxel instead (14.1.16); this needs no bytes and keeps white white.
 //
 // Reciprocal in the sense of anisotropic media, sigma(wo) f(wo, wi) = sigma(wi) f(wi, wo); the integral over wi is at
 // most 1, and exactly 1 where diffuse + transmission = 1 and specular = 0.

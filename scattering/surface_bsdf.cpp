@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scattering/surface_bsdf.h"
 
+#include "scattering/albedo.h"
 #include "scattering/fresnel.h"
 #include "scattering/microfacet_brdf.h"
 
@@ -16,11 +17,6 @@ constexpr float kSmallestRoughness2 = 1e-6f;
 bool is_flat_sggx(const SymMat3& s, const vec3& n) {
   const float trace = s.trace();
   return !(trace - s.quadratic(n) > kFlatShare * trace);
-}
-
-vec3 clamp_albedo(const vec3& albedo) {
-  // max first: it turns NaN into 0.
-  return glm::min(vec3(std::fmax(0.0f, albedo.x), std::fmax(0.0f, albedo.y), std::fmax(0.0f, albedo.z)), vec3(1.0f));
 }
 
 vec3 reflectance(const vec3& f0, float f90, float grazing_share) { return f0 + (vec3(f90) - f0) * grazing_share; }
@@ -42,10 +38,7 @@ SurfaceModel<kChannels>::SurfaceModel(const SurfaceParams& params, const vec3& n
   if constexpr (kHasTransmission) {
     transmission_ = clamp_albedo(params.transmission), transmission_chance_ = max_component(transmission_);
   }
-  if constexpr (kHasDiffuse && kHasTransmission) {
-    const vec3 excess = glm::max(vec3(1.0f), diffuse_ + transmission_);
-    diffuse_ /= excess, transmission_ /= excess;
-  }
+  if constexpr (kHasDiffuse && kHasTransmission) limit_sum(diffuse_, transmission_);
   if constexpr (kHasNormals) is_flat_ = is_flat_sggx(params.sggx, n);
   if constexpr (kHasNormals && kHasBase) {
     if (!is_flat_ && diffuse_chance_ + transmission_chance_ > 0) base_facets_ = Microfacets(params.sggx, n);

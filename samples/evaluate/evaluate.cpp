@@ -2,7 +2,6 @@
 #include "samples/evaluate/evaluate.h"
 
 #include <fmt/format.h>
-#include <stdlib.h>
 
 #include <algorithm>
 #include <chrono>
@@ -17,6 +16,7 @@
 #include "samples/evaluate/views.h"
 #include "samples/path_tracer/asset_view.h"
 #include "samples/path_tracer/environment.h"
+#include "samples/path_tracer/temporary_file.h"
 
 namespace farfield {
 namespace {
@@ -25,30 +25,6 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr int kParts = 4;  // two renders of two half-buffers each: what metrics.h needs to tell noise from error
-
-/// A folder that is gone when this is.
-class TemporaryFolder {
- public:
-  static Result<TemporaryFolder> create() {
-    std::error_code error;
-    std::string name = (fs::temp_directory_path(error) / "farfield-evaluate-XXXXXX").string();
-    if (error || !mkdtemp(name.data()))
-      return make_error(ErrorCode::Io, fmt::format("{}: cannot make a temporary folder; set TMPDIR to one", name));
-    return TemporaryFolder(name);
-  }
-  TemporaryFolder(TemporaryFolder&& other) noexcept : path_(std::exchange(other.path_, fs::path())) {}
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  const fs::path& path() const { return path_; }
-
- private:
-  explicit TemporaryFolder(fs::path path) : path_(std::move(path)) {}
-  fs::path path_;
-};
 
 /// What will be rendered for one level.
 struct LevelPlan {

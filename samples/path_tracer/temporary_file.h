@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that appear whole or not at all.
+// Files that appear whole or not at all, and folders that disappear.
 #pragma once
 
 #include <filesystem>
@@ -22,6 +22,23 @@ class TemporaryFile {
 
  private:
   std::filesystem::path target_;
+  std::filesystem::path path_;
+};
+
+/// A new folder in the system's temporary place, gone with all in it when this is.
+class TemporaryFolder {
+ public:
+  /// Errors: Io.
+  static Result<TemporaryFolder> create();
+  ~TemporaryFolder();
+  TemporaryFolder(TemporaryFolder&& other) noexcept;
+  TemporaryFolder& operator=(TemporaryFolder&&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  explicit TemporaryFolder(std::filesystem::path path);
+
   std::filesystem::path path_;
 };
 

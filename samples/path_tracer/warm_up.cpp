@@ -3,15 +3,13 @@
 
 #include <fmt/format.h>
 #include <malloc.h>
-#include <unistd.h>
 
-#include <cstdlib>
-#include <cstring>
 #include <filesystem>
 
 #include "cache/level_file.h"
 #include "cache/manifest.h"
 #include "samples/path_tracer/integrator.h"
+#include "samples/path_tracer/temporary_file.h"
 
 namespace farfield {
 
@@ -23,30 +21,6 @@ constexpr int kSheetQuads = 48;  ///< along a side of the sheet that stands for 
 constexpr int kBricks = 3;       ///< along a side of the cube that stands for the volume
 constexpr float kSize = 1.0f;    ///< of both
 constexpr uint64_t kBudget = 64 << 20;
-
-// A folder in the system's temporary place, gone at the end.
-class TemporaryFolder {
- public:
-  static Result<TemporaryFolder> create() {
-    std::error_code error;
-    std::string name = (fs::temp_directory_path(error) / "farfield-XXXXXX").string();
-    if (error || !mkdtemp(name.data()))
-      return make_error(ErrorCode::Io, fmt::format("cannot create a folder {}: {}; set TMPDIR", name,
-                                                   error ? error.message() : std::strerror(errno)));
-    return TemporaryFolder(name);
-  }
-  TemporaryFolder(TemporaryFolder&& other) noexcept : path_(std::move(other.path_)) { other.path_.clear(); }
-  TemporaryFolder& operator=(TemporaryFolder&&) = delete;
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  const fs::path& path() const { return path_; }
-
- private:
-  explicit TemporaryFolder(fs::path path) : path_(std::move(path)) {}
-  fs::path path_;
-};
 
 // A wavy sheet with every channel that a surface can have.
 void add_sheet(LevelData& level) {

@@ -228,6 +228,7 @@ TEST(PackLevel, FindsEveryVoxelAgainThroughBricksAndRanks) {
       EXPECT_EQ(level.voxel_sggx[payload], pack_flake_sggx(voxel.sggx));
       EXPECT_EQ(level.voxel_diffuse[payload], pack_color(voxel.diffuse));
       EXPECT_EQ(level.voxel_transmission[payload], pack_color(voxel.transmission));
+      EXPECT_EQ(level.voxel_self_shadowing[payload], std::max<uint8_t>(pack_unorm8(voxel.self_shadowing), 1));
     }
   }
 }

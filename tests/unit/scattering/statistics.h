@@ -44,6 +44,23 @@ double chi_square_p_value(const std::function<dvec3(Rng&)>& sample, const std::f
 /// (Bonferroni; there are fewer than 1000 of them).
 inline constexpr double kSignificance = 0.01 / 1000;
 
+/// The mean of what draw(rng) returns (a vec3 or dvec3), per component, and its standard error.
+struct Mean {
+  dvec3 value{0.0};
+  dvec3 standard_error{0.0};
+};
+template <typename Draw>
+Mean mean_of(int count, uint64_t seed, const Draw& draw) {
+  Rng rng(seed);
+  dvec3 sum(0.0), sum2(0.0);
+  for (int i = 0; i < count; ++i) {
+    const dvec3 v(draw(rng));
+    sum += v, sum2 += v * v;
+  }
+  const dvec3 mean = sum / double(count);
+  return {mean, glm::sqrt(glm::max(sum2 / double(count) - mean * mean, dvec3(0.0)) / double(count))};
+}
+
 /// Matrices that every function of an SGGX meets: isotropic, flat, needles, in between, tilted, of all scales.
 struct NamedSggx {
   std::string name;

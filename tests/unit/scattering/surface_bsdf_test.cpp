@@ -11,33 +11,14 @@ namespace {
 
 using namespace test;
 
-struct Mean {
-  dvec3 value{0.0};
-  dvec3 standard_error{0.0};
-};
-
 /// Albedo towards wo: the mean weight of sample().
 Mean sampled_albedo(const SurfaceBsdf& bsdf, int count, uint64_t seed) {
-  Rng rng(seed);
-  dvec3 sum(0.0), sum2(0.0);
-  for (int i = 0; i < count; ++i) {
-    const dvec3 w(bsdf.sample(rng).weight);
-    sum += w, sum2 += w * w;
-  }
-  const dvec3 mean = sum / double(count);
-  return {mean, glm::sqrt(glm::max(sum2 / double(count) - mean * mean, dvec3(0.0)) / double(count))};
+  return mean_of(count, seed, [&](Rng& rng) { return bsdf.sample(rng).weight; });
 }
 
 /// E[eval] over rng for one pair of directions.
 Mean mean_eval(const SurfaceBsdf& bsdf, const vec3& wi, int count, uint64_t seed) {
-  Rng rng(seed);
-  dvec3 sum(0.0), sum2(0.0);
-  for (int i = 0; i < count; ++i) {
-    const dvec3 f(bsdf.eval(wi, rng));
-    sum += f, sum2 += f * f;
-  }
-  const dvec3 mean = sum / double(count);
-  return {mean, glm::sqrt(glm::max(sum2 / double(count) - mean * mean, dvec3(0.0)) / double(count))};
+  return mean_of(count, seed, [&](Rng& rng) { return bsdf.eval(wi, rng); });
 }
 
 vec3 direction_over(const vec3& n, float cos, float turn) { return Frame(n).to_world(direction_at_height(cos, turn)); }

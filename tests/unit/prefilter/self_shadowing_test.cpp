@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prefilter/self_shadowing.h"
+
+#include <gtest/gtest.h>
+
+#include "leaf_cloud.h"
+#include "prefilter/voxelize.h"
+
+namespace farfield {
+namespace {
+
+using test::leaf_cloud;
+using test::LeafCloud;
+
+const SymMat3 kIsotropic = SymMat3::identity();
+
+TEST(EscapeSums, OfNoLightAskForNothing) {
+  EXPECT_EQ(EscapeSums().ratio(kIsotropic, 1, 1), 1);
+  EscapeSums black;
+  black.add({0, 0, 1}, 0, false);
+  EXPECT_EQ(black.ratio(kIsotropic, 1, 1), 1);
+}
+
+TEST(EscapeSums, CompareWithTheMediumInTheSameDirections) {
+  EscapeSums sums;
+  sums.add({0, 0, 1}, 3, true);
+  sums.add({1, 0, 0}, 1, false);
+  EXPECT_NEAR(sums.ratio(kIsotropic, 0, 1), 0.75, 1e-6);
+  const SymMat3 flat = SymMat3::outer({1, 0, 0});  // only the second light is attenuated
+  EXPECT_NEAR(sums.ratio(flat, 0.5, 2), 3 / (3 + std::exp(-1.0)), 1e-6);
+}
+
+TEST(EscapeSums, StayWithinTheirBounds) {
+  EscapeSums none, all;
+  none.add({0, 0, 1}, 1, false);
+  all.add({0, 0, 1}, 1, true);
+  for (const double density : {0.0, 1.0, 1e3, 1e30}) {
+    EXPECT_EQ(none.ratio(kIsotropic, density, 1), kLeastEscape) << density;
+    EXPECT_GE(all.ratio(kIsotropic, density, 1), 1) << density;
+    EXPECT_LE(all.ratio(kIsotropic, density, 1), kMostEscape) << density;
+  }
+}
+
+SparseVolume voxelized(const Surface& geometry, double voxel_size) {
+  return *voxelize(geometry, {dvec3(0), voxel_size}, {});
+}
+
+struct Means {
+  double self_shadowing = 0, diffuse = 0;
+};
+Means means_of(const SparseVolume& volume) {
+  Means mean;
+  double weight = 0;
+  for (const Voxel& v : volume.voxels) {
+    mean.self_shadowing += v.density * v.self_shadowing;
+    mean.diffuse += v.density * v.diffuse.y;
+    weight += v.density;
+  }
+  return {mean.self_shadowing / weight, mean.diffuse / weight};
+}
+
+// Leaves anywhere, with any normal, are what a medium is: they need neither self-shadowing nor a gain. Single voxels
+// are noisy to both sides (about 40 leaves each).
+TEST(SelfShadowing, OfLeavesAtRandomIsOnlyNoise) {
+  LeafCloud cloud;
+  cloud.count = 20000, cloud.leaf_size = 0.012f;
+  const Means mean = means_of(voxelized(leaf_cloud(cloud), 1.0 / 8));
+  EXPECT_NEAR(mean.self_shadowing, 1, 0.03);
+  EXPECT_NEAR(mean.diffuse, 0.5, 0.02);
+}
+
+// The same leaves in tufts, each much smaller than a voxel: most of the light meets another leaf of the same tuft.
+TEST(SelfShadowing, OfTuftsIsStrong) {
+  LeafCloud cloud;
+  cloud.count = 20000, cloud.leaf_size = 0.012f;
+  Surface leaves = leaf_cloud(cloud);
+  for (size_t i = 0; i < leaves.positions.size(); i += 4) {  // four corners of a leaf
+    const vec3 middle =
+        0.25f * (leaves.positions[i] + leaves.positions[i + 1] + leaves.positions[i + 2] + leaves.positions[i + 3]);
+    const vec3 tuft = (glm::floor(8.0f * middle) + 0.5f) / 8.0f;
+    for (size_t k = i; k < i + 4; ++k) leaves.positions[k] += 0.8f * (tuft - middle);
+  }
+  EXPECT_LT(means_of(voxelized(leaves, 1.0 / 4)).self_shadowing, 0.8);
+}
+
+// Nothing shadows a plane, while a medium in its place shadows itself.
+TEST(SelfShadowing, OfAPlaneIsAGainThatLeavesWhiteAlone) {
+  Surface plane;
+  plane.positions = {{0, 0, 0.5f}, {1, 0, 0.5f}, {1, 1, 0.5f}, {0, 1, 0.5f}};
+  plane.triangles = {{0, 1, 2}, {0, 2, 3}};
+  FaceMaterial material;
+  material.sggx = SymMat3::outer({0, 0, 1});
+  material.diffuse = vec3(1.0f, 0.3f, 0.0f);
+  plane.materials.assign(2, material);
+  for (const Voxel& v : voxelized(plane, 1.0 / 7).voxels) {
+    EXPECT_EQ(v.self_shadowing, 1);
+    EXPECT_NEAR(v.diffuse.x, 1, 1e-5);
+    EXPECT_GT(v.diffuse.y, 0.3f);
+    EXPECT_LT(v.diffuse.y, 0.47f);  // 2 * 0.3 / 1.3
+    EXPECT_EQ(v.diffuse.z, 0);
+  }
+}
+
+}  // namespace
+}  // namespace farfield
