@@ -17,7 +17,7 @@ inline constexpr double kLeastEscape = 0.02, kMostEscape = 2;
 /// Sums over light that leaves points of one voxel's geometry. Not thread safe.
 class EscapeSums {
  public:
-  /// Light of `weight` >= 0 leaves in `direction` (unit), and gets a voxel's side away past the geometry, or not.
+  /// Light of `weight` >= 0 leaves in `direction` (unit), and gets a length away past the geometry, or not.
   void add(const vec3& direction, float weight, bool gets_away);
   /// The light that gets away by what would get as far in an SGGX medium of this density, within the bounds above; 1
   /// where nothing was added. Below 1 geometry is clumped: the medium needs self-shadowing A = ratio. Above 1 it is

@@ -112,13 +112,6 @@ uint64_t VoxelSet::size() const {
   return count;
 }
 
-const VoxelMask* VoxelSet::find(const ivec3& coordinate) const {
-  const auto before = [](const ivec3& a, const ivec3& b) { return brick_key(a) < brick_key(b); };
-  const auto found = std::lower_bound(coordinates.begin(), coordinates.end(), coordinate, before);
-  if (found == coordinates.end() || *found != coordinate) return nullptr;
-  return &masks[static_cast<size_t>(found - coordinates.begin())];
-}
-
 VoxelSet mark_voxels(const Surface& geometry, const VoxelLattice& lattice) {
   constexpr size_t kGrain = 4096;
   const size_t chunks = (geometry.triangles.size() + kGrain - 1) / kGrain;

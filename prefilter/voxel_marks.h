@@ -31,8 +31,6 @@ struct VoxelSet {
   std::vector<VoxelMask> masks;    ///< one per brick, not 0
 
   uint64_t size() const;
-  /// The mask of a brick, or null.
-  const VoxelMask* find(const ivec3& coordinate) const;
 };
 
 /// All voxels that triangles pass through, and some that they pass by within a voxel. All geometry must lie within

@@ -23,13 +23,10 @@
 namespace farfield {
 namespace {
 
-/// Rays start in the voxel and are 1 voxel long: 1.5 voxels along an axis, rarely so far along two of them.
-constexpr double kReach = 1.5;
-/// Voxels that touch one with geometry. The others see few hits: they get fewer rays, since the noise of a sum is least
-/// with rays in proportion to the square root of the hits.
-constexpr double kNearReach = 1;
-constexpr uint32_t kFarShare = 4;
-
+/// How far rays get from their voxel's centre along an axis, in voxels: their middle is in it and they are 1 long.
+constexpr double kReach = 1;
+/// How far light that goes on must get away, in voxels: as far as a ray reaches to either side of its middle.
+constexpr float kEscapeLength = 0.5f;
 /// In voxels: light that goes on starts this far from the face it leaves.
 constexpr float kClearance = 1e-3f;
 
@@ -56,7 +53,7 @@ struct HitSums {
   }
 };
 
-/// The origins (of the cube kernel, docs/decisions/0008) and directions of thesis algorithm 1, in voxels around a
+/// The middles (of the cube kernel, docs/decisions/0008) and directions of thesis algorithm 1, in voxels around a
 /// voxel's centre, from 128 random bits per ray.
 class RaySampler {
  public:
@@ -66,7 +63,7 @@ class RaySampler {
   }
 
   /// Uniform in the unit cube, 21 bits per axis.
-  vec3 origin(uint64_t bits) const {
+  vec3 middle(uint64_t bits) const {
     const auto offset = [](uint64_t b) { return (static_cast<float>(b & 0x1fffff) + 0.5f) * 0x1p-21f - 0.5f; };
     return {offset(bits), offset(bits >> 21), offset(bits >> 42)};
   }
@@ -116,16 +113,17 @@ struct VoxelRays {
   const Surface& geometry;
   const RayScene& scene;
   vec3 center;
-  float size;  ///< of the voxel, and how far rays go
+  float size;  ///< of the voxel, and the length of the rays
   HitSums hits{};
   EscapeSums escape{};
 
-  /// Casts rays from the voxel. What a ray hits first counts.
+  /// Casts rays with their middles in the voxel. What a ray hits first counts.
   void cast(uint32_t rays, SplitMix& random) {
     const RaySampler& sampler = RaySampler::instance();
     for (uint32_t i = 0; i < rays; ++i) {
-      const vec3 origin = center + size * sampler.origin(random.next());
+      const vec3 middle = center + size * sampler.middle(random.next());
       const vec3 direction = sampler.direction(random.next());
+      const vec3 origin = middle - 0.5f * size * direction;
       const auto hit = scene.first_hit(origin, direction, size);
       if (!hit) continue;
       hits.add(geometry.materials[hit->triangle]);
@@ -133,7 +131,7 @@ struct VoxelRays {
     }
   }
 
-  /// Sends on the light of a hit. What is hidden from where the ray came from, within a voxel's size, does not count:
+  /// Sends on the light of a hit. What is hidden from where the ray came from, within its length, does not count:
   /// nobody sees it, and the inside of solid twigs is of that kind.
   void scatter(const vec3& origin, const vec3& direction, const RayHit& hit, uint64_t bits) {
     if (scene.is_occluded(origin, -direction, 0, size - hit.distance)) return;
@@ -141,7 +139,7 @@ struct VoxelRays {
     const vec3 away = scattered_direction(m, hit.normal, direction, bits);
     const vec3 point = origin + hit.distance * direction;
     escape.add(away, component_sum(m.diffuse + m.specular + m.transmission),
-               !scene.is_occluded(point, away, kClearance * size, size));
+               !scene.is_occluded(point, away, kClearance * size, kEscapeLength * size));
   }
 };
 
@@ -150,7 +148,7 @@ struct Measurement {
   const Surface& geometry;
   const VoxelLattice& lattice;
   const RayScene& scene;
-  uint32_t rays;  ///< per voxel near geometry
+  uint32_t rays;  ///< per voxel
   uint64_t seed;
 };
 
@@ -172,18 +170,17 @@ void let_escape(float ratio, Voxel& voxel) {
 }
 
 /// One voxel, or one with density 0 where no ray hits or chance has it so.
-Voxel measure_voxel(const Measurement& m, const ivec3& coordinate, bool is_near) {
+Voxel measure_voxel(const Measurement& m, const ivec3& coordinate) {
   const double size = m.lattice.voxel_size;
   const vec3 center(m.lattice.origin + (dvec3(coordinate) + 0.5) * size);
   SplitMix random = random_of_voxel(coordinate, m.seed);
 
   VoxelRays voxel_rays{m.geometry, m.scene, center, static_cast<float>(size)};
   const HitSums& sums = voxel_rays.hits;
-  const uint32_t first_rays = is_near ? m.rays : (m.rays + kFarShare - 1) / kFarShare;
-  uint32_t rays = first_rays;
+  uint32_t rays = m.rays;
   voxel_rays.cast(rays, random);
   // A transmittance that is the share of a handful of rays is mostly noise: cast as many rays again until it is not.
-  while (rays - sums.hits < kEnoughMisses && rays < kMaxRayFactor * first_rays && sums.hits > rays / 2) {
+  while (rays - sums.hits < kEnoughMisses && rays < kMaxRayFactor * m.rays && sums.hits > rays / 2) {
     voxel_rays.cast(rays, random);
     rays *= 2;
   }
@@ -202,19 +199,19 @@ Voxel measure_voxel(const Measurement& m, const ivec3& coordinate, bool is_near)
   voxel.specular = sums.specular * share;
   voxel.transmission = sums.transmission * share;
   if (sums.roughness2_weight > 0) voxel.roughness2 = sums.roughness2 / sums.roughness2_weight;
-  let_escape(static_cast<float>(voxel_rays.escape.ratio(voxel.sggx, voxel.density, size)), voxel);
+  let_escape(static_cast<float>(voxel_rays.escape.ratio(voxel.sggx, voxel.density, kEscapeLength * size)), voxel);
   return voxel;
 }
 
-/// The voxels of one candidate brick that are kept; `mask` then says which. `near`: those near geometry, or null.
-std::vector<Voxel> measure_brick(const Measurement& m, const ivec3& brick, VoxelMask& mask, const VoxelMask* near) {
+/// The voxels of one candidate brick that are kept; `mask` then says which.
+std::vector<Voxel> measure_brick(const Measurement& m, const ivec3& brick, VoxelMask& mask) {
   std::vector<Voxel> voxels;
   for (int i = 0; i < kBrickVoxels; ++i) {
     const auto word = static_cast<size_t>(i >> 6);
     const uint64_t bit = uint64_t{1} << (i & 63);
     if (!(mask[word] & bit)) continue;
     const ivec3 coordinate = brick * kBrickSide + ivec3(i & 7, i >> 3 & 7, i >> 6);
-    const Voxel voxel = measure_voxel(m, coordinate, near && ((*near)[word] & bit));
+    const Voxel voxel = measure_voxel(m, coordinate);
     if (voxel.density > 0) {
       voxels.push_back(voxel);
     } else {
@@ -253,36 +250,28 @@ uint32_t rays_per_voxel(uint64_t voxels, const VoxelizeOptions& options) {
 }
 
 /// The voxels that may be hit.
-struct Candidates {
-  VoxelSet all, near;  ///< near: those that touch a voxel with geometry
-
-  Candidates(const Surface& geometry, const VoxelLattice& lattice) {
-    const VoxelSet marked = mark_voxels(geometry, lattice);
-    all = widen(marked, kReach);
-    near = widen(marked, kNearReach);
-  }
-};
+VoxelSet find_candidates(const Surface& geometry, const VoxelLattice& lattice) {
+  return widen(mark_voxels(geometry, lattice), kReach);
+}
 
 /// The kept voxels of every stride-th candidate brick; the masks of these bricks become theirs.
 Result<std::vector<std::vector<Voxel>>> measure_bricks(const Surface& geometry, const VoxelLattice& lattice,
-                                                       Candidates& candidates, size_t stride,
+                                                       VoxelSet& candidates, size_t stride,
                                                        const VoxelizeOptions& options) {
-  VoxelSet& bricks = candidates.all;
-  std::vector<std::vector<Voxel>> voxels(bricks.coordinates.size());
+  std::vector<std::vector<Voxel>> voxels(candidates.coordinates.size());
   if (voxels.empty()) return voxels;
   const RayScene rays(geometry);
   if (!rays.is_valid()) {
     return make_error(ErrorCode::Io, "voxelize: Embree could not build the geometry (out of memory?)");
   }
-  const Measurement measurement{geometry, lattice, rays, rays_per_voxel(candidates.near.size(), options), options.seed};
+  const Measurement measurement{geometry, lattice, rays, rays_per_voxel(candidates.size(), options), options.seed};
   const size_t count = (voxels.size() + stride - 1) / stride;
   std::atomic<size_t> done{0};  // relaxed: only for the progress
   const std::thread::id caller = std::this_thread::get_id();
   parallel_for(count, 4, [&](size_t begin, size_t end) {
     if (is_cancelled(options)) return;
     for (size_t i = begin * stride; i < end * stride && i < voxels.size(); i += stride) {
-      const ivec3& coordinate = bricks.coordinates[i];
-      voxels[i] = measure_brick(measurement, coordinate, bricks.masks[i], candidates.near.find(coordinate));
+      voxels[i] = measure_brick(measurement, candidates.coordinates[i], candidates.masks[i]);
     }
     const size_t bricks_done = done.fetch_add(end - begin, std::memory_order_relaxed) + end - begin;
     if (options.progress && std::this_thread::get_id() == caller) {
@@ -302,13 +291,13 @@ Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& latti
   }
   SparseVolume volume;
   volume.lattice = lattice;
-  Candidates candidates(geometry, lattice);
+  VoxelSet candidates = find_candidates(geometry, lattice);
   auto voxels = measure_bricks(geometry, lattice, candidates, 1, options);
   if (!voxels) return tl::unexpected<Error>(voxels.error());
   for (size_t i = 0; i < voxels->size(); ++i) {
     std::vector<Voxel>& of_brick = (*voxels)[i];
     if (of_brick.empty()) continue;
-    volume.bricks.push_back({candidates.all.coordinates[i], candidates.all.masks[i], volume.voxels.size()});
+    volume.bricks.push_back({candidates.coordinates[i], candidates.masks[i], volume.voxels.size()});
     volume.voxels.insert(volume.voxels.end(), of_brick.begin(), of_brick.end());
     of_brick = {};
   }
@@ -322,8 +311,8 @@ Result<VolumeSize> estimate_volume(const Surface& geometry, const VoxelLattice& 
     return tl::unexpected<Error>(checked.error());
   }
   VolumeSize size;
-  Candidates candidates(geometry, lattice);
-  if (candidates.all.coordinates.size() < kStride * kEnoughBricks) return size;
+  VoxelSet candidates = find_candidates(geometry, lattice);
+  if (candidates.coordinates.size() < kStride * kEnoughBricks) return size;
   VoxelizeOptions quietly = options;
   quietly.progress = nullptr;
   const auto voxels = measure_bricks(geometry, lattice, candidates, kStride, quietly);

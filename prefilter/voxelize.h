@@ -51,13 +51,13 @@ struct VoxelizeOptions {
 /// Mean optical depth over a voxel's side below which voxels are thinned out.
 inline constexpr double kFaintestDepth = 0.02;
 
-/// Measures the volume of all triangles of `geometry`, with the rays of thesis algorithm 1. Each voxel that the
-/// geometry touches or that is next to such a one gets rays_per_voxel; up to 16 times as many where almost nothing gets
-/// through, and where there are few voxels; a quarter where the geometry is 2 or 3 voxels away. Of the voxels fainter
-/// than kFaintestDepth only a random share is kept, with that depth, so that on average nothing is lost.
-/// The lattice's origin is in the space of geometry.positions. Empty geometry gives an empty volume. The result does
-/// not depend on the number of threads. Errors: Cancelled; InvalidArgument (options, or geometry further than about a
-/// million voxels from the origin); Io (out of memory in Embree).
+/// Measures the volume of all triangles of `geometry`, with the rays of thesis algorithm 1, but with their middles in
+/// the voxel. Each voxel that the geometry touches or that is next to such a one gets rays_per_voxel; up to 16 times as
+/// many where almost nothing gets through, and where there are few voxels. Of the voxels fainter than kFaintestDepth
+/// only a random share is kept, with that depth, so that on average nothing is lost. The lattice's origin is in the
+/// space of geometry.positions. Empty geometry gives an empty volume. The result does not depend on the number of
+/// threads. Errors: Cancelled; InvalidArgument (options, or geometry further than about a million voxels from the
+/// origin); Io (out of memory in Embree).
 Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options);
 
 /// What a volume would hold.
