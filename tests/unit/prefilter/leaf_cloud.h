@@ -12,6 +12,7 @@
 #include "base/random.h"
 #include "prefilter/surface.h"
 #include "prefilter/voxelize.h"
+#include "test_surfaces.h"
 
 namespace farfield::test {
 
@@ -47,15 +48,6 @@ inline Surface leaf_cloud(const LeafCloud& cloud) {
     surface.materials.insert(surface.materials.end(), 2, material);
   }
   return surface;
-}
-
-inline double total_area(const Surface& surface) {
-  double sum = 0;
-  for (const uvec3& t : surface.triangles) {
-    const dvec3 a(surface.positions[t.x]), b(surface.positions[t.y]), c(surface.positions[t.z]);
-    sum += 0.5 * glm::length(glm::cross(b - a, c - a));
-  }
-  return sum;
 }
 
 /// The triangles, to cast long rays at.
