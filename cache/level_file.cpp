@@ -9,6 +9,7 @@
 #include <system_error>
 #include <vector>
 
+#include "base/hash.h"
 #include "cache/file_io.h"
 #include "cache/level_check.h"
 #include "cache/level_format.h"
@@ -126,6 +127,12 @@ void LevelFile::release_build_pages() const {
     // A failure (pages locked by the host, a system with larger pages) only means that the memory stays in use.
     ::madvise(const_cast<std::byte*>(map_) + pages.begin, pages.end - pages.begin, MADV_DONTNEED);
   }
+}
+
+Result<uint64_t> hash_level_file(const std::filesystem::path& path) {
+  const auto file = LevelFile::open(path, LevelCheck::Structure);
+  if (!file) return tl::unexpected(file.error());
+  return hash_bytes((*file)->bytes());
 }
 
 }  // namespace farfield

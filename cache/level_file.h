@@ -57,4 +57,7 @@ class LevelFile {
   LevelView view_;
 };
 
+/// The hash that a manifest records of a level file: of all its bytes. Errors: those of LevelFile::open.
+Result<uint64_t> hash_level_file(const std::filesystem::path& path);
+
 }  // namespace farfield

@@ -40,6 +40,8 @@ Result<LoadedItem> run_load(const std::function<Result<LoadedItem>()>& load) {
   return loaded;
 }
 
+bool has_failed(ItemState state) { return state == ItemState::Refused || state == ItemState::Broken; }
+
 }  // namespace
 
 ResidentSet::ResidentSet(uint64_t budget_bytes, Report report)
@@ -56,11 +58,11 @@ size_t ResidentSet::add(ResidencyItem item) {
 
 const Resident* ResidentSet::acquire_slowly(size_t index) {
   Item& item = items_[index];
-  if (item.state.load(std::memory_order_acquire) == ItemState::Broken) return nullptr;  // rays ask often: no lock
+  if (has_failed(item.state.load(std::memory_order_acquire))) return nullptr;  // rays ask often: no lock
   std::unique_lock lock(mutex_);
   load_ended_.wait(lock, [&] {
     const ItemState state = item.state.load(std::memory_order_relaxed);
-    return state == ItemState::Ready || state == ItemState::Broken || (state == ItemState::Empty && !is_loading_);
+    return state == ItemState::Ready || has_failed(state) || (state == ItemState::Empty && !is_loading_);
   });
   if (item.state.load(std::memory_order_relaxed) == ItemState::Empty) load(index, lock);
   return item.object.get();
@@ -98,7 +100,6 @@ Result<void> ResidentSet::reserve(Item& item) {
   const uint64_t planned = saturating_add(item.planned.resident_bytes, item.planned.build_peak_bytes);
   const uint64_t total = saturating_add(stats_.accounted_bytes, planned);
   if (total > budget_bytes_) {
-    item.refused = true;
     return make_error(ErrorCode::OutOfBudget,
                       fmt::format("loading it needs {} more, and {} of the budget of {} are in use; raise the budget "
                                   "to {} ({} bytes)",
@@ -110,7 +111,7 @@ Result<void> ResidentSet::reserve(Item& item) {
   return {};
 }
 
-/// Replaces the plan by what the load took, and decides whether the item is Ready or Broken.
+/// Replaces the plan by what the load took, and decides whether the item is Ready, Refused or Broken.
 Result<void> ResidentSet::settle(Item& item, Result<LoadedItem>& loaded) {
   Result<void> outcome;
   if (loaded) {
@@ -120,7 +121,8 @@ Result<void> ResidentSet::settle(Item& item, Result<LoadedItem>& loaded) {
   }
   if (!outcome) {
     ++stats_.broken_items;
-    item.state.store(ItemState::Broken, std::memory_order_release);
+    const bool is_refused = outcome.error().code == ErrorCode::OutOfBudget;
+    item.state.store(is_refused ? ItemState::Refused : ItemState::Broken, std::memory_order_release);
     return outcome;
   }
   item.object = std::move(loaded->object);
@@ -142,7 +144,6 @@ Result<void> ResidentSet::account(Item& item, const LoadedItem& loaded) {
   item.planned.resident_bytes = loaded.resident_bytes;
   item.planned.build_peak_bytes = loaded.build_peak_bytes;
   if (with_item > budget_bytes_) {
-    item.refused = true;
     return make_error(ErrorCode::OutOfBudget,
                       fmt::format("it takes {}, more than planned, and {} of the budget of {} are in use; raise the "
                                   "budget to {} ({} bytes)",
@@ -161,14 +162,14 @@ void ResidentSet::release(std::span<const size_t> items) {
     FARFIELD_CHECK(!is_loading_);
     for (const size_t index : items) {
       Item& item = items_[index];
-      if (item.state.load(std::memory_order_relaxed) == ItemState::Ready) {
+      const ItemState state = item.state.load(std::memory_order_relaxed);
+      if (state == ItemState::Ready) {
         item.ready.store(nullptr, std::memory_order_relaxed);  // no reader runs now: see the thread rule
         dropped.push_back(std::move(item.object));
         dropped_bytes += item.planned.resident_bytes;
         --stats_.ready_items;
         ++stats_.releases;
-      } else if (item.refused) {
-        item.refused = false;
+      } else if (state == ItemState::Refused) {
         --stats_.broken_items;
       } else {
         continue;

@@ -8,7 +8,7 @@
 //   item being loaded, build peak included, which are reserved before its load starts. One load runs at a time, so one
 //   build peak is reserved at a time. When a load ends, what it says it really takes replaces the plan; the difference
 //   is counted in Stats::unplanned_bytes. The budget is hard: a load whose reservation does not fit is not started,
-//   and one that turns out to take too much is undone. Both make the item Broken (OutOfBudget) until it is released.
+//   and one that turns out to take too much is undone. Both make the item Refused until it is released.
 // Who locks. acquire() of a Ready item is one atomic load (acquire), no lock. Otherwise one mutex guards states and
 //   sums. It is never held while loading, reporting or destroying. Threads that need an item being loaded wait on a
 //   condition variable; the first thread that needs an Empty item loads it itself.
@@ -55,7 +55,8 @@ enum class ItemState : uint8_t {
   Empty,    ///< not in memory
   Loading,  ///< some thread loads it
   Ready,    ///< in memory
-  Broken,   ///< its load failed; it stays so (a refusal for lack of budget only until release())
+  Refused,  ///< its load did not fit the budget; until release()
+  Broken,   ///< its load failed; it stays so
 };
 
 struct ResidencyStats {
@@ -64,7 +65,7 @@ struct ResidencyStats {
   uint64_t loads = 0;            ///< that succeeded, reloads included
   uint64_t releases = 0;         ///< of Ready items
   uint64_t ready_items = 0;      ///< now
-  uint64_t broken_items = 0;     ///< now
+  uint64_t broken_items = 0;     ///< now, Refused ones included
   uint64_t unplanned_bytes = 0;  ///< sum over loads of what they took beyond their plan, peaks included
   double load_seconds = 0;       ///< wall time, summed over loads
 };
@@ -86,7 +87,7 @@ class ResidentSet {
   size_t size() const { return items_.size(); }
 
   /// The item's object, loaded first if need be: waits for the thread that loads it, or loads it in this thread.
-  /// nullptr: the item is Broken.
+  /// nullptr: the item is Refused or Broken.
   const Resident* acquire(size_t item) {
     if (const Resident* object = try_acquire(item)) return object;
     return acquire_slowly(item);
@@ -99,8 +100,7 @@ class ResidentSet {
   uint64_t resident_bytes(size_t item) const;
   uint64_t build_peak_bytes(size_t item) const;
 
-  /// Destroys the objects of these items and makes them Empty. Items that are not Ready stay as they are, except that
-  /// those refused for lack of budget become Empty.
+  /// Destroys the objects of those of these items that are Ready, and makes them Empty; Refused ones too.
   void release(std::span<const size_t> items);
 
   uint64_t budget_bytes() const { return budget_bytes_; }
@@ -115,7 +115,6 @@ class ResidentSet {
     std::atomic<ItemState> state{ItemState::Empty};  ///< written under mutex_
     ResidencyItem planned;                           ///< sizes guarded by mutex_; those of the last load after one
     std::unique_ptr<Resident> object;                ///< guarded by mutex_
-    bool refused = false;                            ///< guarded by mutex_; Broken only for lack of budget
   };
 
   const Resident* acquire_slowly(size_t item);

@@ -174,12 +174,6 @@ void add_to_hull(const LevelView& level, SlabHull& hull) {
   }
 }
 
-Result<uint64_t> hash_file(const fs::path& path) {
-  const auto text = read_small_file(path, std::numeric_limits<uint64_t>::max());
-  if (!text) return tl::unexpected<Error>(text.error());
-  return hash_values<char>(*text);
-}
-
 /// One bake, step by step.
 class Baker {
  public:
@@ -342,7 +336,7 @@ class Baker {
     const auto bytes = write_level(path, level);
     if (!bytes) return tl::unexpected<Error>(bytes.error());
     entry.file_bytes = *bytes;
-    const auto hash = hash_file(path);
+    const auto hash = hash_level_file(path);
     if (!hash) return tl::unexpected<Error>(hash.error());
     entry.file_hash = *hash;
     report_.manifest.levels.push_back(entry);

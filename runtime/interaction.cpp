@@ -93,7 +93,7 @@ FlakeParams flake_params(const LevelView& level, const InstanceRecord& instance,
 /// way to the hit and the size of the asset, in the world, together.
 float ray_offset(const InstanceRecord& instance, const vec3& origin, const vec3& position, const Box3& local_bounds) {
   const ScaledInverse inverse(instance);
-  const mat3 to_world = glm::inverse(inverse.matrix);
+  const mat3 to_world(glm::inverse(glm::dmat3(inverse.matrix)));  // its determinant may be no float
   const vec3 corner = glm::max(glm::abs(local_bounds.lower), glm::abs(local_bounds.upper)) / inverse.scale;
   const float asset_size =
       glm::length(to_world[0]) * corner.x + glm::length(to_world[1]) * corner.y + glm::length(to_world[2]) * corner.z;

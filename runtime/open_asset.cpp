@@ -6,6 +6,7 @@
 #include <cmath>
 #include <system_error>
 
+#include "base/hash.h"
 #include "cache/level_file.h"
 #include "cache/manifest.h"
 
@@ -28,6 +29,17 @@ Result<void> check_level_file(const std::filesystem::path& path, uint64_t expect
                                   path.string(), bytes, expected_bytes));
   }
   return {};
+}
+
+/// Checking a file touches all of it, so a level that claims to need less would overrun the budget while it loads.
+Result<void> check_planned_bytes(const LevelEntry& entry, const std::filesystem::path& folder) {
+  if (entry.resident_bytes >= entry.file_bytes || entry.build_peak_bytes >= entry.file_bytes - entry.resident_bytes) {
+    return {};
+  }
+  return make_error(ErrorCode::BadFile,
+                    fmt::format("{}: resident_bytes and build_peak_bytes of level {} are together less than its file "
+                                "of {} bytes; bake the asset again",
+                                (folder / kManifestName).string(), entry.level, entry.file_bytes));
 }
 
 /// A level's file must be the one that the manifest means, since plans and rays go by the manifest.
@@ -60,6 +72,11 @@ Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::
   auto file = LevelFile::open(path, LevelCheck::Full);
   if (!file) return tl::unexpected(file.error());
   loaded->file = std::move(*file);
+  if (hash_bytes(loaded->file->bytes()) != asset.file_hashes[slot]) {
+    return make_error(ErrorCode::BadFile, fmt::format("{} is not the file that its manifest meant when the asset was "
+                                                      "opened; open it again, or bake it again",
+                                                      path.string()));
+  }
   const LevelView& view = loaded->file->view();
   if (auto fits = check_header(view.header, asset, slot, path); !fits) return tl::unexpected(fits.error());
   auto traced = TracedLevel::build(device, view, slot);
@@ -73,7 +90,7 @@ Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::
 }  // namespace
 
 uint64_t OpenAsset::table_bytes() const {
-  constexpr uint64_t kPerLevel = sizeof(LevelInfo) + 2 * sizeof(uint64_t) + sizeof(float) + sizeof(void*) +
+  constexpr uint64_t kPerLevel = sizeof(LevelInfo) + 3 * sizeof(uint64_t) + sizeof(float) + sizeof(void*) +
                                  512;  // the ResidentSet's item and its function
   return sizeof(OpenAsset) + traced.hull.capacity() * sizeof(vec3) + levels.size() * kPerLevel;
 }
@@ -101,11 +118,13 @@ Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folde
     if (auto there = check_level_file(folder / entry.file, entry.file_bytes); !there) {
       return tl::unexpected(there.error());
     }
+    if (auto possible = check_planned_bytes(entry, folder); !possible) return tl::unexpected(possible.error());
     traced.level_numbers.push_back(static_cast<float>(entry.level));
     asset->levels.push_back({entry.level, static_cast<float>(entry.resolution), entry.triangles, entry.voxels,
                              entry.file_bytes, entry.resident_bytes});
     asset->build_peak_bytes.push_back(entry.build_peak_bytes);
     asset->file_names.push_back(entry.file);
+    asset->file_hashes.push_back(entry.file_hash);
   }
   return asset;
 }

@@ -31,6 +31,7 @@ struct OpenAsset {
   std::vector<LevelInfo> levels;
   std::vector<uint64_t> build_peak_bytes;  ///< per level, from the manifest
   std::vector<std::string> file_names;     ///< per level, inside the folder
+  std::vector<uint64_t> file_hashes;       ///< per level, of the whole file
   std::vector<size_t> items;               ///< per level: its number in the ResidentSet
 
   /// Heap bytes of the tables above.
@@ -38,7 +39,8 @@ struct OpenAsset {
 };
 
 /// Reads and checks the manifest and sees that every level's file is there with the size it should have. Loads nothing.
-/// Errors: those of read_manifest; NotFound, BadFile (a level file), Unsupported (more than 256 levels).
+/// Errors: those of read_manifest; NotFound, BadFile (a level file, or sizes that cannot be), Unsupported (more than
+/// 256 levels).
 Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folder);
 
 /// What loads level `slot` of `asset`: maps the file, checks all of it, builds the BVH and gives back what only that

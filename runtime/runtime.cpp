@@ -48,6 +48,12 @@ Result<void> check_options(const RuntimeOptions& options) {
   return {};
 }
 
+bool is_scene_of(RTCScene scene, RTCDevice device) {
+  const RTCDevice of_scene = rtcGetSceneDevice(scene);  // retained for us
+  rtcReleaseDevice(of_scene);
+  return of_scene == device;
+}
+
 /// M after a translation by `origin`, in double: both may be far from zero and cancel.
 mat4x3 with_origin(const mat4x3& m, const dvec3& origin) {
   mat4x3 result = m;
@@ -69,6 +75,8 @@ struct Runtime::Impl final : LevelSource {
   Result<void> load_root(OpenAsset& asset);
   Result<Plan> plan_roots(const OpenAsset& newcomer) const;
   void update_footprints();
+  std::vector<float> camera_footprints() const;
+  void restore(const std::vector<float>& camera_footprints);
   std::vector<PlanAsset> plan_assets() const;
   PlanAsset plan_asset(const OpenAsset& asset) const;
   void apply(const Plan& plan);
@@ -137,7 +145,7 @@ const TracedLevel* Runtime::Impl::serve(uint32_t asset_index, uint32_t slot) {
       if (served != slot) fallbacks.fetch_add(1, std::memory_order_relaxed);
       return level;
     }
-    if (!wait && !was_requested && levels.state(item) != ItemState::Broken) {
+    if (!wait && !was_requested && levels.state(item) == ItemState::Empty) {
       loader.request(item);
       was_requested = true;
     }
@@ -151,6 +159,7 @@ Result<AssetId> Runtime::Impl::open(const std::filesystem::path& folder) {
   for (uint32_t i = 0; i < assets.size(); ++i) {
     if (assets[i]->folder == folder) return AssetId{i};
   }
+  loader.forget();  // its thread must not meet tables that grow, nor take the room of the root
   auto asset = read_asset(folder);
   if (!asset) return tl::unexpected(asset.error());
   if (auto root = load_root(**asset); !root) {
@@ -216,6 +225,19 @@ void Runtime::Impl::update_footprints() {
   });
 }
 
+std::vector<float> Runtime::Impl::camera_footprints() const {
+  std::vector<float> footprints;
+  footprints.reserve(geometry.instances.size());
+  for (const InstanceRecord& instance : geometry.instances) footprints.push_back(instance.footprint.camera_footprint);
+  return footprints;
+}
+
+void Runtime::Impl::restore(const std::vector<float>& camera_footprints) {
+  for (size_t i = 0; i < camera_footprints.size(); ++i) {
+    geometry.instances[i].footprint.camera_footprint = camera_footprints[i];
+  }
+}
+
 /// The lambda that the cameras ask for on an instance, at least 0, not clamped to what there is.
 float Runtime::Impl::wanted_lambda(const InstanceRecord& instance) const {
   if (options.forced_lambda) return std::max(0.0f, *options.forced_lambda);
@@ -227,8 +249,9 @@ float Runtime::Impl::wanted_lambda(const InstanceRecord& instance) const {
 PlanAsset Runtime::Impl::plan_asset(const OpenAsset& asset) const {
   PlanAsset wanted;
   for (const size_t item : asset.items) {
-    wanted.resident_bytes.push_back(levels.resident_bytes(item));
-    wanted.build_peak_bytes.push_back(levels.build_peak_bytes(item));
+    const bool is_lost = levels.state(item) == ItemState::Broken;  // a coarser one serves: it takes nothing
+    wanted.resident_bytes.push_back(is_lost ? 0 : levels.resident_bytes(item));
+    wanted.build_peak_bytes.push_back(is_lost ? 0 : levels.build_peak_bytes(item));
   }
   wanted.lambda = asset.traced.level_numbers;
   wanted.wanted_lambda = wanted.lambda.back();  // if it has no instances
@@ -258,7 +281,8 @@ void Runtime::Impl::apply(const Plan& plan) {
     OpenAsset& asset = *assets[i];
     asset.traced.finest_slot = plan.finest[i];
     for (uint32_t slot = 0; slot < asset.traced.slot_count(); ++slot) {
-      if (slot < plan.finest[i]) {
+      const bool is_refused = levels.state(asset.items[slot]) == ItemState::Refused;  // this plan may have room for it
+      if (slot < plan.finest[i] || is_refused) {
         asset.traced.loaded[slot].store(nullptr, std::memory_order_relaxed);  // no ray in flight
         dropped.push_back(asset.items[slot]);
       }
@@ -386,9 +410,14 @@ Result<PlanSummary> Runtime::plan_frame() {
   if (impl.cameras.empty() && !impl.options.forced_lambda) {
     return make_error(ErrorCode::InvalidArgument, "plan_frame() needs a camera: call set_cameras() before");
   }
+  impl.loader.forget();  // plan with sizes that no longer change
+  const std::vector<float> former_footprints = impl.camera_footprints();
   impl.update_footprints();
   const auto plan = plan_levels(impl.plan_assets(), impl.options.budget_bytes, impl.fixed_bytes());
-  if (!plan) return tl::unexpected(plan.error());
+  if (!plan) {
+    impl.restore(former_footprints);
+    return tl::unexpected(plan.error());
+  }
   impl.apply(*plan);
 
   PlanSummary summary;
@@ -405,25 +434,29 @@ void Runtime::prefetch() { impl_->prefetch(); }
 Result<unsigned> Runtime::attach(RTCScene scene) {
   Impl& impl = *impl_;
   if (!scene) return make_error(ErrorCode::InvalidArgument, "attach() needs a scene");
+  if (!is_scene_of(scene, impl.host_device)) {
+    return make_error(ErrorCode::InvalidArgument, "attach() needs a scene of the device that create() was given");
+  }
   if (!impl.handle) {
     impl.handle = impl.geometry.create(impl.host_device);
   } else {
     impl.geometry.update(impl.handle);
   }
-  if (scene != impl.scene) {
-    rtcRetainScene(scene);  // so that its address stays its own
-    if (impl.scene) rtcReleaseScene(impl.scene);
-    impl.scene = scene;
-    impl.geometry_id = rtcAttachGeometry(scene, impl.handle);
+  if (scene == impl.scene) return impl.geometry_id;
+
+  const unsigned id = rtcAttachGeometry(scene, impl.handle);
+  if (id == RTC_INVALID_GEOMETRY_ID) {
+    return make_error(ErrorCode::Io, fmt::format("Embree refuses the geometry (error {})",
+                                                 static_cast<int>(rtcGetDeviceError(impl.host_device))));
   }
-  if (const RTCError error = rtcGetDeviceError(impl.host_device); error != RTC_ERROR_NONE) {
-    return make_error(
-        ErrorCode::Io,
-        fmt::format("Embree refuses the geometry (error {}): is the scene of the device that create() was "
-                    "given?",
-                    static_cast<int>(error)));
+  rtcRetainScene(scene);  // so that its address stays its own
+  if (impl.scene) {
+    rtcDetachGeometry(impl.scene, impl.geometry_id);
+    rtcReleaseScene(impl.scene);
   }
-  return impl.geometry_id;
+  impl.scene = scene;
+  impl.geometry_id = id;
+  return id;
 }
 
 unsigned Runtime::geometry_id() const { return impl_->geometry_id; }

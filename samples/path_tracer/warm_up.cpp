@@ -83,7 +83,10 @@ Result<LevelEntry> write_warm_up_level(const fs::path& folder, uint32_t number) 
   entry.file = fmt::format("level_{:02}.bin", number);
   const auto bytes = write_level(folder / entry.file, level);
   if (!bytes) return tl::unexpected(bytes.error());
+  const auto hash = hash_level_file(folder / entry.file);
+  if (!hash) return tl::unexpected(hash.error());
   entry.file_bytes = *bytes;
+  entry.file_hash = *hash;
   entry.triangles = face_count(level);
   entry.voxels = voxel_count(level);
   entry.bricks = level.bricks.size();

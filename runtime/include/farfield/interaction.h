@@ -18,7 +18,7 @@ struct InteractionModel;
 /// One sampled direction. A zero weight is a failed sample: end the path.
 struct ScatterSample {
   glm::vec3 wi{0.0f};      ///< unit, away from the point
-  glm::vec3 weight{0.0f};  ///< linear RGB: surfaces f |cos| / pdf, volumes albedo * phase / pdf
+  glm::vec3 weight{0.0f};  ///< linear RGB: what to multiply the path's throughput by. Not eval() / pdf in volumes
   float pdf = 0;           ///< per steradian: pdf(wi), for multiple importance sampling
 };
 
@@ -47,7 +47,8 @@ class FARFIELD_API Interaction {
   /// Surfaces: BRDF (and transmission) times |cos|; volumes: albedo times phase function. Linear RGB per steradian.
   /// For diffuse microfacets an unbiased one-sample estimate: rng supplies the sample.
   glm::vec3 eval(const glm::vec3& wi, Rng& rng) const;
-  /// Density with which sample() draws wi, per steradian.
+  /// For multiple importance sampling, per steradian. Surfaces: the density with which sample() draws wi. Volumes: a
+  /// normalised density close to that, which has no closed form; estimates stay unbiased with ScatterSample::weight.
   float pdf(const glm::vec3& wi) const;
   /// Diameter spread to give the next ray's cone, by how wide the lobe that was sampled is: the incoming spread plus an
   /// eighth of the lobe's, 2 sqrt(1 / (pi pdf)), at most 1. About 0.25 after a diffuse event, 0.5 in isotropic volumes,

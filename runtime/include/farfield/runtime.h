@@ -132,8 +132,9 @@ class FARFIELD_API Runtime {
 
   /// Puts the user geometry into the host's scene and returns its geomID; the host commits the scene. Call again after
   /// adding instances. All instances are primitives of this one geometry: primID is InstanceId::value. The scene is
-  /// retained until the next attach() to another one, must not be instanced, and must not be traced or committed once
-  /// the Runtime is gone. Errors: InvalidArgument (no scene), Io (what Embree says).
+  /// retained until the next attach() to another one, which takes the geometry out of it; it must not be instanced, and
+  /// must not be traced or committed once the Runtime is gone. After an error nothing has changed. Errors:
+  /// InvalidArgument (no scene, or one of another device), Io (what Embree says).
   Result<unsigned> attach(RTCScene scene);
   unsigned geometry_id() const;
 

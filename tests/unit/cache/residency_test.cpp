@@ -160,6 +160,7 @@ TEST_F(ResidencyTest, LoadThatDoesNotFitIsNotStarted) {
   ASSERT_NE(residency.acquire(a), nullptr);
   EXPECT_EQ(residency.acquire(b), nullptr);
   EXPECT_EQ(residency.acquire(b), nullptr);
+  EXPECT_EQ(residency.state(b), ItemState::Refused);
   EXPECT_EQ(loads_, 1);
   ASSERT_EQ(reports_.size(), 1u);
   EXPECT_NE(reports_[0].find("1001 bytes"), std::string::npos) << reports_[0];

@@ -20,6 +20,7 @@ namespace {
 
 using testing::hash_of_hits;
 using testing::Host;
+using testing::set_diffuse;
 using testing::TemporaryFolder;
 using testing::white_sphere;
 using testing::write_asset;
@@ -178,6 +179,31 @@ TEST_F(RuntimeTest, ABudgetBelowTheRootsIsRefusedWithTheNumberThatWouldDo) {
   EXPECT_FALSE(Host(with_budget(enough - 1)).runtime().open_asset(sphere().string()));
 }
 
+TEST_F(RuntimeTest, AManifestThatPromisesLessThanItsFilesIsRefused) {
+  const auto liar = copy("liar.farfield");
+  Manifest manifest = *read_manifest(liar);
+  manifest.levels[1].resident_bytes = 10, manifest.levels[1].build_peak_bytes = 10;
+  ASSERT_TRUE(write_manifest(liar, manifest));
+  Host host;
+  const auto asset = host.runtime().open_asset(liar.string());
+  ASSERT_FALSE(asset);
+  EXPECT_EQ(asset.error().code, ErrorCode::BadFile);
+  EXPECT_NE(asset.error().message.find("level 1"), std::string::npos) << asset.error().message;
+}
+
+TEST_F(RuntimeTest, AssetsCanBeOpenedWhileTheLoaderWorks) {
+  RuntimeOptions options;
+  options.residency = Residency::Progressive;
+  Host host(options);
+  for (int i = 0; i < 40; ++i) {
+    host.add(copy(("progressive" + std::to_string(i) + ".farfield").c_str()));
+    host.plan(vec3(0, 0, 2));
+    host.runtime().prefetch();
+  }
+  EXPECT_EQ(host.messages, std::vector<std::string>{});
+  EXPECT_GE(host.runtime().stats().levels_resident, 40u);
+}
+
 // --- Instances and scenes --------------------------------------------------------------------------------------------
 
 TEST_F(RuntimeTest, InstancesNeedAnAssetAndATransformThatCanBeInverted) {
@@ -208,6 +234,39 @@ TEST_F(RuntimeTest, AttachingAgainTakesNewInstancesAndKeepsTheId) {
   ASSERT_TRUE(host.trace({5, 0, 10}, {0, 0, -1}, context, hit));
   EXPECT_EQ(hit.hit.primID, 1u);
   EXPECT_FALSE(host.runtime().attach(nullptr));
+}
+
+TEST_F(RuntimeTest, ASceneOfAnotherDeviceIsRefusedAndNothingChanges) {
+  Host host;
+  host.add(sphere());
+  host.plan();
+  const unsigned id = host.runtime().geometry_id();
+  for (int i = 0; i < 3; ++i) {  // would release the device too often if it did so once too often
+    Host other;
+    const RTCScene foreign = rtcNewScene(other.device());
+    const auto attached = host.runtime().attach(foreign);
+    ASSERT_FALSE(attached);
+    EXPECT_EQ(attached.error().code, ErrorCode::InvalidArgument);
+    rtcReleaseScene(foreign);
+  }
+  EXPECT_EQ(host.runtime().geometry_id(), id);
+  RayContext context;
+  RTCRayHit hit;
+  EXPECT_TRUE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));
+}
+
+TEST_F(RuntimeTest, AttachingToAnotherSceneLeavesTheFirst) {
+  Host host;
+  host.add(sphere());
+  host.plan();
+  const RTCScene second = rtcNewScene(host.device());
+  ASSERT_TRUE(host.runtime().attach(second));
+  rtcReleaseScene(second);
+  host.commit();  // back to the first: there once, not twice
+  RayContext context;
+  RTCRayHit hit;
+  EXPECT_TRUE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));
+  EXPECT_TRUE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));
 }
 
 TEST_F(RuntimeTest, ASceneWithoutInstancesIsEmpty) {
@@ -348,6 +407,57 @@ TEST_F(RuntimeTest, OpeningAnotherAssetMakesRoomForItsRoot) {
   EXPECT_LE(host.runtime().stats().peak_accounted_bytes, whole + 1000);
 }
 
+TEST_F(RuntimeTest, ALevelThatDidNotFitIsLoadedOnceAPlanHasRoom) {
+  // The first asset takes more than its manifest says, so the second does not fit beside it.
+  const auto liar = copy("liar.farfield"), honest = copy("honest.farfield");
+  Manifest manifest = *read_manifest(liar);
+  LevelEntry& level = manifest.levels[0];
+  level.resident_bytes -= (level.resident_bytes + level.build_peak_bytes - level.file_bytes) / 2;
+  ASSERT_TRUE(write_manifest(liar, manifest));
+  const vec3 far(1000, 0, 0);
+  mat4x3 moved(1.0f);
+  moved[3] = far;
+  const auto add_both = [&](Host& host) {
+    host.add(liar);
+    host.add(honest, {moved});
+    host.runtime().set_cameras({{vec3(0, 0, 2), 0.0f, 1e-3f}, {far + vec3(0, 0, 2), 0.0f, 1e-3f}});
+    const auto plan = host.runtime().plan_frame();
+    EXPECT_TRUE(plan);
+    host.commit();
+    return *plan;
+  };
+  Host probe;
+  Host host(with_budget(add_both(probe).planned_bytes));
+  ASSERT_EQ(add_both(host).finest_level, (std::vector<uint32_t>{0, 0}));
+  const auto level_seen_at = [&](const vec3& middle, float cone_width = 0.0f) {
+    RayContext context;
+    context.cone_width = cone_width;
+    RTCRayHit hit;
+    EXPECT_TRUE(host.trace(middle + vec3(0, 0, 2), {0, 0, -1}, context, hit));
+    return host.interaction(hit, context).level;
+  };
+  for (float width = 4; width > 1e-3f; width /= 2)
+    level_seen_at(vec3(0), width), level_seen_at(far, width);  // the rest
+  EXPECT_EQ(level_seen_at(vec3(0)), 0u);
+  EXPECT_GT(level_seen_at(far), 0u);
+  EXPECT_EQ(host.messages.size(), 1u);
+  ASSERT_EQ(host.plan(far + vec3(0, 0, 2)).finest_level[1], 0u);
+  EXPECT_EQ(level_seen_at(far), 0u);
+}
+
+TEST_F(RuntimeTest, AFailedPlanLeavesTheFormerOne) {
+  Host host(with_budget(8 << 20));
+  const AssetId asset = host.add(sphere());
+  host.plan(vec3(0, 0, 300));
+  const uint64_t before = hash_of_hits(host);
+  for (int i = 0; i < 50000; ++i) ASSERT_TRUE(host.runtime().add_instance(asset, mat4x3(1.0f)));
+  host.runtime().set_cameras({{vec3(0, 0, 2), 0.0f, 1e-3f}});
+  const auto plan = host.runtime().plan_frame();
+  ASSERT_FALSE(plan);
+  EXPECT_EQ(plan.error().code, ErrorCode::OutOfBudget);
+  EXPECT_EQ(hash_of_hits(host), before);
+}
+
 // --- What rays see ---------------------------------------------------------------------------------------------------
 
 TEST_F(RuntimeTest, ThreadsTemperatureAndBudgetDoNotChangeWhatRaysSee) {
@@ -387,6 +497,21 @@ TEST_F(RuntimeTest, ABrokenLevelIsReportedOnceAndTheNextCoarserServes) {
   host.plan();
   hash_of_hits(host);
   EXPECT_EQ(host.messages.size(), 1u);
+}
+
+TEST_F(RuntimeTest, ALevelThatWasReplacedSinceTheAssetWasOpenedIsNotMixedIn) {
+  const auto rebaked = copy("rebaked.farfield"), grey = copy("grey.farfield");
+  std::vector<LevelData> levels = white_sphere();
+  set_diffuse(levels[1], vec3(0.5f));
+  write_asset(grey, levels);
+  Host host(with_lambda(1.0f));
+  host.add(rebaked);
+  host.plan();
+  std::filesystem::copy_file(grey / "level_1.ffl", rebaked / "level_1.ffl",
+                             std::filesystem::copy_options::overwrite_existing);
+  hash_of_hits(host);
+  ASSERT_EQ(host.messages.size(), 1u);
+  EXPECT_NE(host.messages[0].find("level_1.ffl"), std::string::npos) << host.messages[0];
 }
 
 TEST_F(RuntimeTest, ProgressiveRaysUseTheRootFirstAndThePlanInTheEnd) {

@@ -46,6 +46,7 @@ void write_asset(const std::filesystem::path& folder, const std::vector<LevelDat
     const auto cost = measure_level_scene(view_of(level));
     FARFIELD_CHECK(bytes && cost);
     entry.file_bytes = *bytes;
+    entry.file_hash = *hash_level_file(folder / entry.file);
     entry.triangles = face_count(level);
     entry.voxels = voxel_count(level);
     entry.bricks = level.bricks.size();
