@@ -13,6 +13,12 @@ def percent(x, digits=2):
     return "-" if x is None else "%+.*f %%" % (digits, 100 * x)
 
 
+def color_error(level):
+    if level["color_error_low"] > 0:
+        return percent(level["color_error"])
+    return "lost in noise (with it %.0f %%)" % (100 * level["color_error_raw"])
+
+
 def table(folder, name):
     evaluated = json.load(open("%s/%s.evaluate.json" % (folder, name)))
     baked = json.load(open("%s/%s.bake.json" % (folder, name)))
@@ -26,7 +32,7 @@ def table(folder, name):
         print("| %d | %d | %d | %.0f | %.0f | %s | %s | %s | %s | %s |" % (
             level["grid"], level["triangles"], level["voxels"], level["bytes_disk"] / 1024,
             level["bytes_resident"] / 1024, percent(level["occlusion_error"]), percent(level["occlusion_rms"]),
-            percent(level["color_error"]), ", ".join(percent(b, 1) for b in level["color_bias"]),
+            color_error(level), ", ".join(percent(b, 1) for b in level["color_bias"]),
             ", ".join("%+.2f" % t for t in thesis) if thesis else "-"))
     print("\n![source, level, difference](%s.png)\n" % name)
 

@@ -24,12 +24,14 @@ struct BakeArguments {
 void print_summary(const BakeArguments& arguments, const BakeReport& report) {
   uint64_t bytes = 0;
   for (const LevelEntry& level : report.manifest.levels) bytes += level.file_bytes;
-  fmt::print("{}: {} levels, {}, {}\n", arguments.output, report.manifest.levels.size(), format_bytes(bytes),
+  const size_t levels = report.manifest.levels.size();
+  fmt::print("{}: {} level{}, {}, {}\n", arguments.output, levels, levels == 1 ? "" : "s", format_bytes(bytes),
              report.up_to_date ? "up to date" : fmt::format("baked in {:.1f} s", report.total_seconds));
 }
 
 Result<void> run_bake(BakeArguments& arguments) {
-  if (auto writable = check_can_write(arguments.report, Output::Text); !writable) return writable;
+  if (auto writable = check_can_write(arguments.report, Output::Text, {arguments.source, arguments.output}); !writable)
+    return writable;
   const ThreadLimit limit(arguments.threads);
   ProgressLine progress;
   arguments.options.measure_resident = measure_resident;
@@ -51,8 +53,12 @@ void add_bake_command(CLI::App& app, Action& action) {
   BakeOptions& options = arguments->options;
   CLI::App* command =
       app.add_subcommand("bake", "Bake a model to a folder of levels; goes on where an interrupted bake stopped");
-  command->add_option("source", arguments->source, "Model: OBJ, PLY, glTF or glb, gzipped or not")->required();
-  command->add_option("-o,--output", arguments->output, "Folder to write, by convention NAME.farfield")->required();
+  command->add_option("source", arguments->source, "Model: OBJ, PLY, glTF or glb, gzipped or not")
+      ->required()
+      ->check(is_named);
+  command->add_option("-o,--output", arguments->output, "Folder to write, by convention NAME.farfield")
+      ->required()
+      ->check(is_named);
   command->add_option("--finest-grid", options.finest_grid, "Voxels along the longest side of level 1, a power of two")
       ->capture_default_str();
   command->add_option("--coarsest-grid", options.coarsest_grid, "The same of the last level, the root")
@@ -61,7 +67,7 @@ void add_bake_command(CLI::App& app, Action& action) {
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   command->add_option("--mesh", options.import.mesh, "glTF: bake only this mesh, in its own space")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0, 1 << 20));
   command->add_flag("--source-only", options.source_only, "Write level 0 only: the source, ready to render");
   command->add_option("--threads", arguments->threads, "0: as many as the machine has")
       ->check(CLI::Range(0, 4096))

@@ -18,7 +18,6 @@ namespace fs = std::filesystem;
 bool stdout_is_terminal() { return isatty(STDOUT_FILENO) == 1; }
 
 void print_warnings(std::string_view command, const std::vector<std::string>& warnings, size_t shown) {
-  if (isatty(STDERR_FILENO) != 1) return;
   for (size_t i = 0; i < std::min(shown, warnings.size()); ++i)
     fmt::print(stderr, "farfield {}: warning: {}\n", command, one_line(warnings[i]));
   if (warnings.size() > shown)
@@ -70,10 +69,40 @@ Result<void> write_to_stream(const fs::path& path, std::string_view text) {
   return make_error(ErrorCode::Io, fmt::format("{}: cannot write: {}", path.string(), std::strerror(errno)));
 }
 
+bool is_same_place(const fs::path& a, const fs::path& b) {
+  std::error_code error;
+  return fs::weakly_canonical(a, error) == fs::weakly_canonical(b, error);
+}
+
+Result<void> check_extension(const fs::path& path, Output output) {
+  const char* expected = output == Output::Exr ? ".exr" : ".png";
+  if (output == Output::Text || path.extension() == expected) return {};
+  return make_error(ErrorCode::InvalidArgument,
+                    fmt::format("{}: the file that is written here must be named {}", path.string(), expected));
+}
+
+Result<void> check_keeps(const fs::path& path, const std::vector<fs::path>& inputs) {
+  for (const fs::path& input : inputs) {
+    if (input.empty()) continue;
+    if (is_same_place(path, input)) {
+      return make_error(ErrorCode::InvalidArgument,
+                        fmt::format("{}: is read here; write to another file", path.string()));
+    }
+    if (is_same_place(fs::absolute(path).parent_path(), input)) {
+      return make_error(ErrorCode::InvalidArgument, fmt::format("{}: {} holds a baked asset and nothing else; write to "
+                                                                "another folder",
+                                                                path.string(), input.string()));
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
-Result<void> check_can_write(const fs::path& path, Output output) {
+Result<void> check_can_write(const fs::path& path, Output output, const std::vector<fs::path>& inputs) {
   if (path.empty() || (output == Output::Text && is_stream(path))) return {};
+  if (auto named = check_extension(path, output); !named) return named;
+  if (auto kept = check_keeps(path, inputs); !kept) return kept;
   const auto refuse = [&](std::string_view reason) {
     return make_error(ErrorCode::Io, fmt::format("{}: cannot write: {}", path.string(), reason));
   };

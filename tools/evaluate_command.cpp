@@ -34,16 +34,18 @@ std::string evaluation_table(const Evaluation& evaluation) {
     const ErrorMetrics& e = level.errors;
     rows.push_back({fmt::format("{}", level.entry.level), fmt::format("{}^3", level.entry.grid),
                     with_error(e.occlusion_error, true), with_error(e.occlusion_rms, false),
-                    with_error(e.color_error, false), with_error(e.color_bias[0], true),
-                    with_error(e.color_bias[1], true), with_error(e.color_bias[2], true),
-                    fmt::format("{:.2f} %", 100 * e.color_noise), fmt::format("{}", level.samples_per_pixel)});
+                    e.color_error_low > 0 ? with_error(e.color_error, false) : "lost in noise: raise --spp",
+                    with_error(e.color_bias[0], true), with_error(e.color_bias[1], true),
+                    with_error(e.color_bias[2], true), fmt::format("{:.2f} %", 100 * e.color_noise),
+                    fmt::format("{}", level.samples_per_pixel)});
   }
   return format_table(rows);
 }
 
 Result<void> run_evaluate(EvaluateArguments& arguments) {
-  if (auto writable = check_can_write(arguments.json, Output::Text); !writable) return writable;
-  if (auto writable = check_can_write(arguments.sheet, Output::Picture); !writable) return writable;
+  const std::vector<std::filesystem::path> inputs = {arguments.source, arguments.asset};
+  if (auto writable = check_can_write(arguments.json, Output::Text, inputs); !writable) return writable;
+  if (auto writable = check_can_write(arguments.sheet, Output::Png, inputs); !writable) return writable;
   const ThreadLimit limit(arguments.threads);
   ProgressLine progress;
   EvaluateOptions& options = arguments.options;
@@ -71,15 +73,19 @@ void add_evaluate_command(CLI::App& app, Action& action) {
   EvaluateOptions& options = arguments->options;
   CLI::App* command =
       app.add_subcommand("evaluate", "Measure how far the levels of a baked asset look from their source");
-  command->add_option("asset", arguments->asset, "Baked folder")->required();
-  command->add_option("--source", arguments->source, "The model it was baked from")->required();
-  command->add_option("--mesh", options.import.mesh, "glTF: the mesh that was baked")->check(CLI::NonNegativeNumber);
+  command->add_option("asset", arguments->asset, "Baked folder; keeps the errors, for `farfield info`")
+      ->required()
+      ->check(is_named);
+  command->add_option("--source", arguments->source, "The model it was baked from")->required()->check(is_named);
+  command->add_option("--mesh", options.import.mesh, "glTF: the mesh that was baked")->check(CLI::Range(0, 1 << 20));
   add_parsed_option(command, "--levels", arguments->levels, parse_level_range,
                     "Levels A-B; without it all but the source");
   command->add_option("--views", options.views, "Pictures per level")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  command->add_option("--spp", options.samples_per_pixel, "Samples per pixel; without it more for smaller pictures")
+  command
+      ->add_option("--spp", options.samples_per_pixel,
+                   "Samples per pixel, rounded up to four; without it more for smaller pictures")
       ->check(CLI::Range(1, 1 << 20));
   command->add_option("--seed", options.seed, "Of the random numbers");
   command->add_option("--threads", arguments->threads, "0: as many as the machine has")

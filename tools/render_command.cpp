@@ -15,7 +15,10 @@ struct FrameArguments : RenderArguments {
 };
 
 Result<void> run_render(FrameArguments& arguments) {
-  if (auto writable = check_can_write(arguments.output, Output::Picture); !writable) return writable;
+  if (auto writable =
+          check_can_write(arguments.output, Output::Exr, {arguments.scene, arguments.environment, arguments.assets});
+      !writable)
+    return writable;
   const auto report = run_with_progress(arguments, [&](const RenderOptions& options) {
     return render_frame(options, arguments.frame, arguments.output);
   });

@@ -21,6 +21,12 @@ Result<Blend> parse_blend(const std::string& text) {
   return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a way to blend; dissolve is", text));
 }
 
+Result<uint64_t> parse_budget(const std::string& text) {
+  const auto bytes = parse_bytes(text);
+  if (bytes && *bytes == 0) return make_error(ErrorCode::InvalidArgument, "nothing fits 0 bytes");
+  return bytes;
+}
+
 /// What CLI::PositiveNumber says, but NaN is no number either.
 std::string is_scale(const std::string& text) {
   float scale = 0;
@@ -32,8 +38,8 @@ std::string is_scale(const std::string& text) {
 
 void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::string& output_help) {
   RenderOptions& options = arguments.options;
-  command->add_option("scene", arguments.scene, "glTF scene: .glb or .gltf")->required();
-  command->add_option("-o,--output", arguments.output, output_help)->required();
+  command->add_option("scene", arguments.scene, "glTF scene: .glb or .gltf")->required()->check(is_named);
+  command->add_option("-o,--output", arguments.output, output_help)->required()->check(is_named);
   const auto set_size = [&options](const std::string& text) {
     const auto size = parse_pixel_size(text);
     if (!size) throw CLI::ValidationError("--size", size.error().message);
@@ -45,7 +51,7 @@ void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::
       ->check(CLI::Range(1, 1 << 20))
       ->capture_default_str();
   command->add_option("--seed", options.trace.seed, "Of the random numbers");
-  add_parsed_option(command, "--budget", options.budget_bytes, parse_bytes,
+  add_parsed_option(command, "--budget", options.budget_bytes, parse_budget,
                     "Memory for assets, e.g. 300M or 4GiB: a hard limit")
       ->default_str(format_bytes(options.budget_bytes));
   command->add_option("--assets", arguments.assets,
@@ -59,7 +65,9 @@ void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::
   command->add_option("--environment", arguments.environment, "Light from a latitude-longitude EXR");
   command->add_option("--exposure", options.exposure_stops, "Of the PNG previews, in stops")
       ->check(CLI::Range(-50, 50));
-  command->add_option("--finest-grid", options.finest_grid, "Of assets that have to be baked")->capture_default_str();
+  command->add_option("--finest-grid", options.finest_grid, "Of assets that have to be baked, a power of two")
+      ->check(is_finest_grid)
+      ->capture_default_str();
   command->add_option("--threads", arguments.threads, "0: as many as the machine has")
       ->check(CLI::Range(0, 4096))
       ->capture_default_str();

@@ -299,9 +299,12 @@ Result<Evaluation> evaluate(const EvaluateOptions& options) {
 
   auto evaluation = Evaluator(options, **source).run(*plans);
   if (!evaluation) return evaluation;
-  if (source_manifest->source_hash != manifest->source_hash)
+  if (source_manifest->source_hash != manifest->source_hash) {
     evaluation->warnings.push_back(
-        fmt::format("{}: was baked from a file that differs from {}", options.asset.string(), options.source.string()));
+        fmt::format("{}: was baked from a file that differs from {}; the errors are not recorded in the asset",
+                    options.asset.string(), options.source.string()));
+    return evaluation;
+  }
   if (auto recorded = record_errors(options.asset, evaluation->levels); !recorded)
     evaluation->warnings.push_back(fmt::format("errors are not recorded in the asset: {}", recorded.error().message));
   return evaluation;

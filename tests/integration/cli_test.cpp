@@ -316,7 +316,9 @@ TEST_F(WholeRoad, EvaluateWarnsWhenTheSourceIsAnother) {
   write_bush_obj(path("other.obj"), 200);
   const ProcessOutput output = farfield({"evaluate", asset, "--source", path("other.obj"), "--levels", "3", "--views",
                                          "1", "--spp", "4", "--json", path("other.json")});
-  expect_quiet_success(output);
+  EXPECT_EQ(output.exit_code, 0);
+  EXPECT_EQ(output.out, "");
+  EXPECT_NE(output.err.find("warning"), std::string::npos) << output.err;
   EXPECT_EQ(Json::parse(contents(path("other.json")))["warnings"].size(), 1u);
 }
 

@@ -51,7 +51,27 @@ TEST(CheckCanWrite, FindsOutBeforeTheWorkIsDone) {
 
 TEST(CheckCanWrite, NeverLetsAPictureReplaceADevice) {
   EXPECT_TRUE(check_can_write("/dev/null", Output::Text));
-  EXPECT_FALSE(check_can_write("/dev/null", Output::Picture));
+  EXPECT_FALSE(check_can_write("/dev/null", Output::Png));
+}
+
+TEST(CheckCanWrite, WantsPicturesNamedByTheirKind) {
+  EXPECT_TRUE(check_can_write("a.exr", Output::Exr));
+  EXPECT_TRUE(check_can_write("a.png", Output::Png));
+  for (const char* name : {"a.png", "a.jpg", "a", ".exr"}) EXPECT_FALSE(check_can_write(name, Output::Exr)) << name;
+  EXPECT_FALSE(check_can_write("a.exr", Output::Png));
+}
+
+TEST(CheckCanWrite, NeverReplacesWhatIsRead) {
+  const fs::path folder = fresh_folder("inputs");
+  ASSERT_TRUE(write_text_file(folder / "oak.obj", "v"));
+  const std::vector<fs::path> inputs = {folder / "oak.obj", folder / "oak.farfield", ""};
+  EXPECT_TRUE(check_can_write(folder / "oak.json", Output::Text, inputs));
+  for (const fs::path& bad :
+       {folder / "oak.obj", folder / "." / "oak.obj", folder / "oak.farfield" / "manifest.json"}) {
+    const auto checked = check_can_write(bad, Output::Text, inputs);
+    ASSERT_FALSE(checked) << bad;
+    EXPECT_EQ(checked.error().code, ErrorCode::InvalidArgument);
+  }
 }
 
 TEST(WriteTextFile, WritesIntoDevicesWithoutReplacingThem) {
