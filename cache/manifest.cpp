@@ -328,6 +328,16 @@ Result<Manifest> read_manifest(const fs::path& asset_dir) {
   return manifest_from_json(*text, path.string());
 }
 
+ManifestWriter manifest_writer(const fs::path& asset_dir) {
+  const Result<std::string> text = read_small_file(asset_dir / kManifestName, kMaxManifestBytes);
+  if (!text) return ManifestWriter::Unknown;
+  if (nesting_depth(*text) > kMaxDepth) return ManifestWriter::Other;
+  const Json json = Json::parse(*text, nullptr, /*allow_exceptions=*/false);
+  if (json.is_discarded()) return ManifestWriter::Unknown;
+  FieldReader read;
+  return read.text(json, "generator").starts_with("farfield ") ? ManifestWriter::Farfield : ManifestWriter::Other;
+}
+
 Result<void> write_manifest(const fs::path& asset_dir, const Manifest& manifest) {
   const fs::path path = asset_dir / kManifestName;
   if (const Problem problem = find_problem(manifest)) {

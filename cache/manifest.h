@@ -60,6 +60,14 @@ struct Manifest {
 /// Errors: NotFound, Io, BadFile, Unsupported (newer format version).
 Result<Manifest> read_manifest(const std::filesystem::path& asset_dir);
 
+/// Whose DIR/manifest.json is, however damaged or new: browsers, package managers and others write files of this name.
+enum class ManifestWriter {
+  Farfield,  ///< JSON that names Farfield as its generator
+  Other,     ///< other JSON
+  Unknown,   ///< no readable file, or no JSON: half a file, zeros
+};
+ManifestWriter manifest_writer(const std::filesystem::path& asset_dir);
+
 /// Writes DIR/manifest.json atomically (temporary name, sync, rename). Errors: Io, InvalidArgument (a manifest that
 /// read_manifest() would refuse).
 Result<void> write_manifest(const std::filesystem::path& asset_dir, const Manifest& manifest);

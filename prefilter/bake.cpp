@@ -388,6 +388,11 @@ class Baker {
 
 Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeOptions& options) {
   if (auto checked = check_options(options); !checked) return tl::unexpected<Error>(checked.error());
+  // What is no asset cannot be up to date: refused before the import, which may take minutes. An asset with other
+  // files in it may be; then they do no harm.
+  if (auto checked = check_replaceable(out); !checked && !read_manifest(out)) {
+    return tl::unexpected<Error>(checked.error());
+  }
   const Stopwatch watch;
   if (options.progress) options.progress("import", 0);
   auto asset = import_asset(source, options.import);

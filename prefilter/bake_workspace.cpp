@@ -11,13 +11,18 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <regex>
+#include <set>
+#include <string>
 #include <system_error>
 #include <utility>
 
 #include "base/hash.h"
 #include "cache/level_file.h"
+#include "cache/manifest.h"
 
 namespace farfield {
 namespace {
@@ -37,13 +42,19 @@ fs::path without_trailing_slash(const fs::path& path) {
   return normal.has_filename() ? normal : normal.parent_path();
 }
 
-/// Whether a bake may replace what is at `out`.
-bool is_replaceable(const fs::path& out) {
-  std::error_code error;
-  const fs::file_status status = fs::symlink_status(out, error);
-  if (status.type() == fs::file_type::not_found) return true;
-  if (status.type() != fs::file_type::directory) return false;
-  return fs::exists(out / "manifest.json", error) || fs::is_empty(out, error);
+/// Whether an asset's files, or what a write of them that was cut short leaves behind, bear this name.
+bool is_asset_file_name(const std::string& name) {
+  static const std::regex kPattern(R"((manifest\.json|level_[0-9]+\.ffl)(\.tmp-[0-9]+-[0-9]+)?)");
+  return std::regex_match(name, kPattern);
+}
+
+/// Whether a folder with files of these names, all of them asset file names, is an asset. A damaged manifest still
+/// counts as ours beside level files: nobody else's files bear their names.
+bool is_asset(const fs::path& folder, const std::set<std::string>& names) {
+  if (!names.contains(kManifestName)) return false;
+  const bool has_levels = std::ranges::any_of(names, [](const auto& name) { return name.starts_with("level_"); });
+  const ManifestWriter writer = manifest_writer(folder);
+  return writer == ManifestWriter::Farfield || (writer == ManifestWriter::Unknown && has_levels);
 }
 
 /// Swaps two folders in one step where the file system can; otherwise moves one aside first.
@@ -59,6 +70,33 @@ int exchange(const fs::path& staged, const fs::path& out, const fs::path& aside)
 }
 
 }  // namespace
+
+Result<void> check_replaceable(const fs::path& out) {
+  const auto refuse = [&](const std::string& reason) {
+    return make_error(ErrorCode::InvalidArgument,
+                      fmt::format("{}: {}; move it away or choose another name", out.string(), reason));
+  };
+  std::error_code error;
+  const fs::file_status status = fs::symlink_status(out, error);
+  if (status.type() == fs::file_type::not_found) return {};
+  if (status.type() != fs::file_type::directory) return refuse("exists and is not a baked asset");
+
+  std::set<std::string> names;
+  for (fs::directory_iterator entry(out, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    std::error_code unknown;
+    if (entry->symlink_status(unknown).type() != fs::file_type::regular || !is_asset_file_name(name)) {
+      return refuse(fmt::format("has \"{}\" in it, which a bake would delete", name));
+    }
+    names.insert(name);
+  }
+  if (error) return io_error("list", out, error);
+  if (!names.empty() && !is_asset(out, names)) {
+    return refuse(names.contains(kManifestName) ? "its manifest.json is not Farfield's"
+                                                : "exists and is not a baked asset");
+  }
+  return {};
+}
 
 BakeWorkspace::BakeWorkspace(fs::path out, fs::path folder, int lock)
     : out_(std::move(out)), folder_(std::move(folder)), lock_(lock) {}
@@ -76,11 +114,7 @@ BakeWorkspace::~BakeWorkspace() {
 
 Result<BakeWorkspace> BakeWorkspace::open(const fs::path& out_path) {
   const fs::path out = without_trailing_slash(out_path);
-  if (!is_replaceable(out)) {
-    return make_error(
-        ErrorCode::InvalidArgument,
-        fmt::format("{}: exists and is not a baked asset; remove it or choose another name", out.string()));
-  }
+  if (auto checked = check_replaceable(out); !checked) return tl::unexpected<Error>(checked.error());
   fs::path folder = out;
   folder += ".partial";
   std::error_code error;
@@ -127,6 +161,7 @@ Result<void> BakeWorkspace::store_volume(uint64_t key, const LevelData& volume) 
 }
 
 Result<void> BakeWorkspace::publish() {
+  if (auto checked = check_replaceable(out_); !checked) return checked;
   std::error_code error;
   const fs::path aside = folder_ / "previous";
   const int renamed =

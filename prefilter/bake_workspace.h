@@ -12,12 +12,16 @@
 
 namespace farfield {
 
+/// Whether a bake may replace, and thus delete, what is at `out`: nothing, an empty folder, or an asset with no other
+/// files in it. Errors: InvalidArgument (naming what does not belong), Io.
+Result<void> check_replaceable(const std::filesystem::path& out);
+
 /// The working folder of one bake; locked, so that two bakes of one asset do not mix. When it goes without publish(),
 /// it keeps the stored volumes and removes the rest. One thread at a time.
 class BakeWorkspace {
  public:
-  /// Creates or finds OUT.partial. Errors: InvalidArgument (OUT is something else than a baked asset or an empty
-  /// folder, which a bake must not replace; another bake of it is running), Io.
+  /// Creates or finds OUT.partial. Errors: those of check_replaceable(OUT), InvalidArgument (another bake of it is
+  /// running), Io.
   static Result<BakeWorkspace> open(const std::filesystem::path& out);
   BakeWorkspace(BakeWorkspace&& other) noexcept;
   BakeWorkspace& operator=(BakeWorkspace&&) = delete;
@@ -31,8 +35,8 @@ class BakeWorkspace {
   /// Stores a packed volume (pack_volume, not empty) for a later bake. Errors: Io.
   Result<void> store_volume(uint64_t key, const LevelData& volume) const;
 
-  /// Makes asset_dir() the asset OUT, in one step also where OUT exists, and removes the workspace. Errors: Io; the
-  /// asset that was at OUT is then untouched.
+  /// Makes asset_dir() the asset OUT, in one step also where OUT exists, and removes the workspace. Errors: those of
+  /// check_replaceable(OUT), as it may have changed since open(), Io; what was at OUT is then untouched.
   Result<void> publish();
 
  private:

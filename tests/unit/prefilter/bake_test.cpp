@@ -439,6 +439,90 @@ TEST_F(Bake, NeverReplacesWhatIsNotABakedAsset) {
   EXPECT_TRUE(bake(two_triangles(), "x", out(), small_options()).has_value());
 }
 
+/// Expects that a bake refuses to replace out(), names `stranger`, and leaves all as it is.
+void expect_refused(const fs::path& out, const std::string& stranger) {
+  const auto before = files_of(out);
+  const auto report = bake(two_triangles(), "x", out, small_options());
+  ASSERT_FALSE(report.has_value()) << stranger;
+  EXPECT_EQ(report.error().code, ErrorCode::InvalidArgument);
+  EXPECT_NE(report.error().message.find(out.string()), std::string::npos) << report.error().message;
+  EXPECT_NE(report.error().message.find(stranger), std::string::npos) << report.error().message;
+  EXPECT_EQ(files_of(out), before);
+  EXPECT_FALSE(fs::exists(out.string() + ".partial"));
+}
+
+void write_file(const fs::path& path, const std::string& text) { std::ofstream(path) << text; }
+
+TEST_F(Bake, NeverReplacesAFolderWithSomebodyElsesManifest) {
+  fs::create_directories(out());
+  for (const char* text : {R"({"name": "a web app", "start_url": "/"})", R"({"version": 1, "generator": "vite"})",
+                           R"({"version": 1, "generator": 7})", "[]", "no JSON", ""}) {
+    write_file(out() / "manifest.json", text);
+    expect_refused(out(), "manifest.json is not Farfield's");
+  }
+  write_file(out() / "index.html", "<html>");
+  expect_refused(out(), "index.html");
+}
+
+TEST_F(Bake, NeverReplacesAnAssetWithOtherFilesInIt) {
+  ASSERT_TRUE(bake(ball_in_leaves(), "thing", out(), small_options()).has_value());
+  for (const char* name : {"notes.txt", "level_1.ffl.bak", "level_.ffl", "manifest.json.tmp", ".hidden"}) {
+    write_file(out() / name, "mine");
+    expect_refused(out(), name);
+    fs::remove(out() / name);
+  }
+  fs::create_directory(out() / "level_9.ffl");
+  expect_refused(out(), "level_9.ffl");
+  fs::remove(out() / "level_9.ffl");
+  fs::create_symlink(folder_, out() / "level_9.ffl");
+  expect_refused(out(), "level_9.ffl");
+}
+
+TEST_F(Bake, AFileThatDoesNotBelongDoesNoHarmWhileTheAssetIsUpToDate) {
+  ASSERT_TRUE(bake(two_triangles(), "x", out(), small_options()).has_value());
+  write_file(out() / "notes.txt", "mine");
+  const auto report = bake(two_triangles(), "x", out(), small_options());
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  EXPECT_TRUE(report->up_to_date);
+}
+
+TEST_F(Bake, RefusesWhatIsNoAssetBeforeItReadsTheSource) {
+  fs::create_directories(out());
+  write_file(out() / "thesis.tex", "years of work");
+  const auto report = bake(folder_ / "missing.obj", out(), small_options());
+  ASSERT_FALSE(report.has_value());
+  EXPECT_EQ(report.error().code, ErrorCode::InvalidArgument);
+}
+
+TEST_F(Bake, KeepsAFileThatWasPutIntoTheOldAssetMeanwhile) {
+  ASSERT_TRUE(bake(two_triangles(), "x", out(), small_options()).has_value());
+  BakeOptions options = small_options();
+  options.progress = [&](const std::string& stage, double) {
+    if (stage == "level 4: write") write_file(out() / "notes.txt", "mine");
+  };
+  const auto report = bake(ball_in_leaves(), "thing", out(), options);
+  ASSERT_FALSE(report.has_value());
+  EXPECT_EQ(report.error().code, ErrorCode::InvalidArgument);
+  EXPECT_TRUE(fs::exists(out() / "notes.txt"));
+  EXPECT_EQ(read_manifest(out())->source, "x");
+}
+
+TEST_F(Bake, ReplacesDamagedAndNewerAssetsAndWhatKilledWritersLeft) {
+  ASSERT_TRUE(bake(two_triangles(), "x", out(), small_options()).has_value());
+  const auto whole = files_of(out());
+  const std::string manifest = whole.at("manifest.json");
+  for (const std::string& damaged :
+       {std::string(), manifest.substr(0, 100), std::string(500, '\0'),
+        std::string(R"({"version": 99, "generator": "farfield 9.0.0", "levels": "elsewhere"})")}) {
+    write_file(out() / "manifest.json", damaged);
+    write_file(out() / "manifest.json.tmp-17-3", "half");
+    write_file(out() / "level_0.ffl.tmp-17-2", "half");
+    const auto report = bake(two_triangles(), "x", out(), small_options());
+    ASSERT_TRUE(report.has_value()) << report.error().message;
+    EXPECT_EQ(files_of(out()), whole);
+  }
+}
+
 TEST_F(Bake, FailsClearlyWhereItCannotWrite) {
   std::ofstream(folder_ / "file") << "not a folder";
   const auto report = bake(two_triangles(), "x", folder_ / "file" / "asset.farfield", small_options());
