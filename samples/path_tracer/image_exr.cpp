@@ -4,6 +4,7 @@
 #include <ImfFloatAttribute.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfIO.h>
 #include <ImfInputFile.h>
 #include <ImfIntAttribute.h>
 #include <ImfOutputFile.h>
@@ -14,6 +15,7 @@
 
 #include <algorithm>
 #include <array>
+#include <stdexcept>
 #include <system_error>
 
 #include "samples/path_tracer/image.h"
@@ -30,6 +32,21 @@ constexpr uint64_t kMostValues = uint64_t{1} << 30;
 constexpr std::array kFormatAttributes = {
     "channels", "chunkCount",       "compression",        "dataWindow",        "displayWindow", "lineOrder", "name",
     "tiles",    "pixelAspectRatio", "screenWindowCenter", "screenWindowWidth", "type",          "version"};
+
+// OpenEXR's destructors swallow the errors of the last writes; the temporary file remembers them.
+class ExrStream : public Imf::OStream {
+ public:
+  ExrStream(TemporaryFile& file, const std::filesystem::path& name) : OStream(name.c_str()), file_(file) {}
+  void write(const char* data, int bytes) override { check(file_.write(data, static_cast<size_t>(bytes))); }
+  uint64_t tellp() override { return file_.position(); }
+  void seekp(uint64_t position) override { check(file_.seek(position)); }
+
+ private:
+  static void check(bool succeeded) {
+    if (!succeeded) throw std::runtime_error("cannot write");  // commit() has the reason
+  }
+  TemporaryFile& file_;
+};
 
 void insert_metadata(Imf::Header& header, const Metadata& metadata) {
   for (const auto& [name, value] : metadata) {
@@ -103,13 +120,15 @@ Result<void> write_exr(const std::filesystem::path& path, const Image& image, co
     header.compression() = Imf::ZIPS_COMPRESSION;  // one line at a time: the least working memory
     for (const std::string& name : image.channels) header.channels().insert(name, Imf::Channel(Imf::FLOAT));
     insert_metadata(header, metadata);
-    Imf::OutputFile file(temporary.path().c_str(), header, 0);
+    ExrStream stream(temporary, path);
+    Imf::OutputFile file(stream, header, 0);
     // OpenEXR only reads through these pointers when it writes a file.
     char* values = reinterpret_cast<char*>(const_cast<float*>(image.values.data()));
     file.setFrameBuffer(slices_of(values, image, 0, 0));
     file.writePixels(image.height);
   } catch (const std::exception& error) {
-    return make_error(ErrorCode::Io, fmt::format("cannot write {}: {}", path.string(), error.what()));
+    if (temporary.is_good())
+      return make_error(ErrorCode::Io, fmt::format("cannot write {}: {}", path.string(), error.what()));
   }
   return temporary.commit();
 }

@@ -3,20 +3,20 @@
 
 #include <gtest/gtest.h>
 #include <sys/mount.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <thread>
 
 #include "cache/level_file.h"
 #include "cache/manifest.h"
+#include "file_size_limit.h"
 #include "sample_asset.h"
 
 namespace farfield {
 namespace {
 
+using test::FileSizeLimit;
 using test::TemporaryFolder;
 
 Result<void> write_one(const std::filesystem::path& path, std::string_view text) {
@@ -107,25 +107,6 @@ TEST(OpenRegularFile, TellsOfMissingPermission) {
   EXPECT_EQ(file.error().code, ErrorCode::Io);
   EXPECT_NE(file.error().message.find("Permission denied"), std::string::npos);
 }
-
-/// Makes files end at `bytes` while alive: the next byte is an error, as on a full disk, but without root.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &old_limit_);
-    rlimit limit = old_limit_;
-    limit.rlim_cur = bytes;
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    ::setrlimit(RLIMIT_FSIZE, &old_limit_);
-    std::signal(SIGXFSZ, old_handler_);
-  }
-
- private:
-  rlimit old_limit_;
-  void (*old_handler_)(int);
-};
 
 TEST(WriteFileAtomically, FailureInTheMiddleKeepsTheOldFileAndRemovesTheNew) {
   const TemporaryFolder folder;

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "base/random.h"
+#include "tests/unit/cache/file_size_limit.h"
 #include "tests/unit/cache/sample_asset.h"
 
 namespace farfield {
@@ -89,6 +90,40 @@ TEST(Exr, FailuresNameTheFile) {
   EXPECT_EQ(write_exr(folder.path() / "a.exr", Image()).error().code, ErrorCode::InvalidArgument);
   EXPECT_EQ(read_exr(folder.path() / "none.exr").error().code, ErrorCode::NotFound);
   EXPECT_TRUE(folder.names().empty());
+}
+
+TEST(Exr, FullDiskIsAnErrorAndKeepsTheOldFile) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path path = folder.path() / "a.exr";
+  const Image image = noise_image(40, 40, {"R", "G", "B", "A"});
+  ASSERT_TRUE(write_exr(path, image));
+  const std::vector<std::byte> bytes = test::read_bytes(path);
+  for (size_t size = 0; size < bytes.size(); size += 509) {
+    const test::FileSizeLimit limit(size);
+    const auto written = write_exr(path, image);
+    ASSERT_FALSE(written) << size << " of " << bytes.size();
+    EXPECT_EQ(written.error().code, ErrorCode::Io);
+    EXPECT_NE(written.error().message.find(path.string() + ": File too large"), std::string::npos);
+    EXPECT_EQ(test::read_bytes(path), bytes);
+    EXPECT_EQ(folder.names(), std::vector<std::string>{"a.exr"});
+  }
+}
+
+TEST(Png, FullDiskIsAnErrorAndKeepsTheOldFile) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path path = folder.path() / "a.png";
+  const Image image = noise_image(60, 60, {"R", "G", "B"});
+  ASSERT_TRUE(write_png(path, image));
+  const std::vector<std::byte> bytes = test::read_bytes(path);
+  for (size_t size = 0; size < bytes.size(); size += 509) {
+    const test::FileSizeLimit limit(size);
+    const auto written = write_png(path, image);
+    ASSERT_FALSE(written) << size << " of " << bytes.size();
+    EXPECT_EQ(written.error().code, ErrorCode::Io);
+    EXPECT_NE(written.error().message.find("File too large"), std::string::npos) << written.error().message;
+    EXPECT_EQ(test::read_bytes(path), bytes);
+    EXPECT_EQ(folder.names(), std::vector<std::string>{"a.png"});
+  }
 }
 
 TEST(Exr, EveryTruncationIsAnError) {
