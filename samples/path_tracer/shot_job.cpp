@@ -100,11 +100,11 @@ Result<RenderReport> render_shot(const RenderOptions& options, const FrameRange&
   // The sheet and the frames of an earlier run are read before memory is measured.
   ContactSheet sheet = make_sheet(frames, options.width, options.height);
   RenderReport earlier = finished_before(out, fingerprint, frames);
-  for (const FrameReport& frame : earlier.frames) {
+  std::erase_if(earlier.frames, [&](const FrameReport& frame) {
     const auto file = read_exr(frame_path(out, frame.frame));
-    if (!file) return tl::unexpected(file.error());
-    sheet.set(sheet_cell(frames, frame.frame), file->image);
-  }
+    if (file) sheet.set(sheet_cell(frames, frame.frame), file->image);
+    return !file;  // damaged: it is rendered again
+  });
   const std::vector<int> missing = frames_to_render(frames, earlier);
   if (options.message && !earlier.frames.empty())
     options.message(fmt::format("{} of {} frames are finished already", earlier.frames.size(), frames.count()));

@@ -158,6 +158,18 @@ TEST_F(Shot, LostFrameIsRenderedAgain) {
   EXPECT_EQ(test::read_bytes(out() / "frame_0012.exr"), bytes);  // and it is the same
 }
 
+TEST_F(Shot, DamagedFrameIsRenderedAgain) {
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  const std::vector<std::byte> bytes = test::read_bytes(out() / "frame_0012.exr");
+  for (const size_t size : {size_t{0}, bytes.size() / 2, bytes.size() - 1}) {
+    test::write_bytes(out() / "frame_0012.exr", std::span(bytes).first(size));
+    const auto report = shoot({0, 12, 12});
+    ASSERT_TRUE(report) << report.error().message;
+    EXPECT_EQ(report->frames.size(), 2u);
+    EXPECT_EQ(test::read_bytes(out() / "frame_0012.exr"), bytes);
+  }
+}
+
 TEST_F(Shot, FrameDoesNotDependOnTheFramesBefore) {
   ASSERT_TRUE(shoot({0, 24, 6}));
   ASSERT_TRUE(render_frame(options_, 24, folder_.path() / "alone.exr"));
