@@ -76,7 +76,7 @@ int sync_folder(const fs::path& folder) {
 /// A file that is removed at the end unless it was renamed to its final name.
 class TemporaryFile {
  public:
-  explicit TemporaryFile(const fs::path& final_path) : path_(temporary_name(final_path)), final_path_(final_path) {}
+  explicit TemporaryFile(const fs::path& final_path) : final_path_(final_path) {}
   ~TemporaryFile() {
     if (fd_ >= 0) ::close(fd_);
     if (exists_) ::unlink(path_.c_str());
@@ -85,7 +85,10 @@ class TemporaryFile {
   TemporaryFile& operator=(const TemporaryFile&) = delete;
 
   int create() {
-    fd_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+    do {  // in a container each run has the same process id, and a killed one leaves its files
+      path_ = temporary_name(final_path_);
+      fd_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+    } while (fd_ < 0 && errno == EEXIST);
     exists_ = fd_ >= 0;
     return exists_ ? 0 : errno;
   }

@@ -44,6 +44,18 @@ TEST(WriteFileAtomically, WritesThePiecesInOrderAndLeavesNothingElse) {
   EXPECT_EQ(*read_small_file(folder.path() / "a", 100), "");
 }
 
+TEST(WriteFileAtomically, PassesOverWhatAKilledProcessOfTheSameIdLeft) {
+  const TemporaryFolder folder;
+  constexpr int kLeft = 3000;  // more than this program has written before
+  for (int i = 0; i < kLeft; ++i) {
+    test::write_text(folder.path() / ("a.tmp-" + std::to_string(::getpid()) + "-" + std::to_string(i)), "half");
+  }
+  const Result<void> written = write_one(folder.path() / "a", "whole");
+  ASSERT_TRUE(written) << written.error().message;
+  EXPECT_EQ(*read_small_file(folder.path() / "a", 100), "whole");
+  EXPECT_EQ(folder.names().size(), kLeft + 1u);
+}
+
 TEST(WriteFileAtomically, NamesTheFolderThatIsMissing) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "missing" / "a";
