@@ -67,11 +67,7 @@ int write_all(int fd, std::span<const std::byte> bytes) {
 }
 
 /// Makes a rename durable. File systems that cannot sync a folder say EINVAL; there is nothing more to do on those.
-int sync_folder(const fs::path& folder) {
-  const FileDescriptor fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (fd.get() < 0) return errno;
-  return ::fsync(fd.get()) == 0 || errno == EINVAL ? 0 : errno;
-}
+int sync_folder(const FileDescriptor& folder) { return ::fsync(folder.get()) == 0 || errno == EINVAL ? 0 : errno; }
 
 /// A file that is removed at the end unless it was renamed to its final name.
 class TemporaryFile {
@@ -125,13 +121,20 @@ Result<void> write_file_atomically(const fs::path& path, std::span<const std::sp
   uint64_t total_bytes = 0;
   for (const auto& piece : pieces) total_bytes += piece.size();
 
+  // Opened before anything is written, so that only the disk itself can fail the last step.
+  const FileDescriptor folder(::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (folder.get() < 0) return write_error(errno, path, total_bytes);
+
   TemporaryFile file(path);
   int error = file.create();
   for (size_t i = 0; error == 0 && i < pieces.size(); ++i) error = file.write(pieces[i]);
   if (error == 0) error = file.sync_and_close();
   if (error == 0) error = file.rename_to_final();
-  if (error == 0) error = sync_folder(folder_of(path));
   if (error != 0) return write_error(error, path, total_bytes);
+  if (error = sync_folder(folder); error != 0) {
+    return make_error(ErrorCode::Io, fmt::format("wrote {}, but it may be lost in a power cut: {}; check the disk",
+                                                 path.string(), system_words(error)));
+  }
   return {};
 }
 

@@ -12,8 +12,9 @@
 namespace farfield {
 
 /// Writes the concatenated pieces to `path`: to a temporary name in the same folder, synced, renamed, the folder
-/// synced. After an error nothing of it is left and what was at `path` before is untouched. Any thread; two writers of
-/// one path do not disturb each other, the last rename wins. Errors: Io, naming the path, the system's words, a remedy.
+/// synced. After an error nothing of it is left and what was at `path` before is untouched, unless the disk fails when
+/// the folder is synced: then the new file is there, and the error says so. Any thread; two writers of one path do not
+/// disturb each other, the last rename wins. Errors: Io, naming the path, the system's words, a remedy.
 Result<void> write_file_atomically(const std::filesystem::path& path,
                                    std::span<const std::span<const std::byte>> pieces);
 

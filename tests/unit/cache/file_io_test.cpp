@@ -107,6 +107,21 @@ TEST(WriteFileAtomically, TellsOfMissingPermission) {
   EXPECT_TRUE(folder.names().empty());
 }
 
+TEST(WriteFileAtomically, AFolderThatCannotBeSyncedIsAnErrorBeforeAnythingIsReplaced) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "a";
+  test::write_text(path, "old");
+  // Files may be made and renamed in it, but it cannot be opened.
+  ASSERT_EQ(::chmod(folder.path().c_str(), 0333), 0);
+  {
+    const NoRoot no_root;
+    expect_io_error(write_one(path, "new"), path, "check the permissions of " + folder.path().string());
+  }
+  std::filesystem::permissions(folder.path(), std::filesystem::perms::owner_all);
+  EXPECT_EQ(*read_small_file(path, 100), "old");
+  EXPECT_EQ(folder.names(), std::vector<std::string>{"a"});
+}
+
 TEST(OpenRegularFile, TellsOfMissingPermission) {
   const TemporaryFolder folder;
   std::filesystem::permissions(folder.path(), std::filesystem::perms::all);
