@@ -15,7 +15,10 @@
 namespace farfield {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+// Keys are written in the order of the documentation, but read into a sorted map: an ordered one is searched from the
+// start for each key, and a hostile manifest has hundreds of thousands.
+using Json = nlohmann::json;
+using OrderedJson = nlohmann::ordered_json;
 
 namespace {
 
@@ -245,20 +248,20 @@ Manifest manifest_from_json(const Json& json, FieldReader& read) {
 
 // ---- values to JSON ----
 
-Json to_json(const dvec3& point) { return Json::array({point.x, point.y, point.z}); }
+OrderedJson to_json(const dvec3& point) { return OrderedJson::array({point.x, point.y, point.z}); }
 
-Json to_json(const LevelEntry& level) {
-  Json json = {{"level", level.level},
-               {"resolution", level.resolution},
-               {"grid", level.grid},
-               {"file", level.file},
-               {"file_bytes", level.file_bytes},
-               {"file_hash", to_hex(level.file_hash)},
-               {"triangles", level.triangles},
-               {"voxels", level.voxels},
-               {"bricks", level.bricks},
-               {"resident_bytes", level.resident_bytes},
-               {"build_peak_bytes", level.build_peak_bytes}};
+OrderedJson to_json(const LevelEntry& level) {
+  OrderedJson json = {{"level", level.level},
+                      {"resolution", level.resolution},
+                      {"grid", level.grid},
+                      {"file", level.file},
+                      {"file_bytes", level.file_bytes},
+                      {"file_hash", to_hex(level.file_hash)},
+                      {"triangles", level.triangles},
+                      {"voxels", level.voxels},
+                      {"bricks", level.bricks},
+                      {"resident_bytes", level.resident_bytes},
+                      {"build_peak_bytes", level.build_peak_bytes}};
   if (level.errors) {
     json["errors"] = {{"occlusion_error", level.errors->occlusion_error},
                       {"occlusion_rms", level.errors->occlusion_rms},
@@ -270,23 +273,23 @@ Json to_json(const LevelEntry& level) {
 }  // namespace
 
 std::string manifest_to_json(const Manifest& manifest) {
-  Json hull = Json::array();
+  OrderedJson hull = OrderedJson::array();
   for (const vec3& point : manifest.hull) hull.push_back(to_json(dvec3(point)));
-  Json levels = Json::array();
+  OrderedJson levels = OrderedJson::array();
   for (const LevelEntry& level : manifest.levels) levels.push_back(to_json(level));
-  const Json json = {{"version", manifest.version},
-                     {"generator", manifest.generator},
-                     {"source", manifest.source},
-                     {"source_hash", to_hex(manifest.source_hash)},
-                     {"options", manifest.options},
-                     {"origin", to_json(manifest.origin)},
-                     {"bounds_lower", to_json(dvec3(manifest.bounds.lower))},
-                     {"bounds_upper", to_json(dvec3(manifest.bounds.upper))},
-                     {"base_resolution", manifest.base_resolution},
-                     {"levels", std::move(levels)},
-                     {"hull", std::move(hull)}};
+  const OrderedJson json = {{"version", manifest.version},
+                            {"generator", manifest.generator},
+                            {"source", manifest.source},
+                            {"source_hash", to_hex(manifest.source_hash)},
+                            {"options", manifest.options},
+                            {"origin", to_json(manifest.origin)},
+                            {"bounds_lower", to_json(dvec3(manifest.bounds.lower))},
+                            {"bounds_upper", to_json(dvec3(manifest.bounds.upper))},
+                            {"base_resolution", manifest.base_resolution},
+                            {"levels", std::move(levels)},
+                            {"hull", std::move(hull)}};
   // `replace`: a source's file name need not be UTF-8, JSON must be.
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json.dump(2, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
 }
 
 Result<Manifest> manifest_from_json(std::string_view text, std::string_view name) {
