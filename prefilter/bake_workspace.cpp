@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <stdio.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -55,6 +56,32 @@ bool is_asset(const fs::path& folder, const std::set<std::string>& names) {
   const bool has_levels = std::ranges::any_of(names, [](const auto& name) { return name.starts_with("level_"); });
   const ManifestWriter writer = manifest_writer(folder);
   return writer == ManifestWriter::Farfield || (writer == ManifestWriter::Unknown && has_levels);
+}
+
+/// Whether the descriptor is of what the path names now.
+bool is_same(int descriptor, const fs::path& path) {
+  struct stat opened, named;
+  return ::fstat(descriptor, &opened) == 0 && ::stat(path.c_str(), &named) == 0 && opened.st_dev == named.st_dev &&
+         opened.st_ino == named.st_ino;
+}
+
+/// Makes a folder if it is not there, and opens and locks it. Returns its descriptor.
+Result<int> lock_folder(const fs::path& folder) {
+  for (;;) {
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error) return io_error("create", folder, error);
+    const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (descriptor < 0 && errno != ENOENT) return io_error("open", folder, std::strerror(errno));
+    const bool is_locked = descriptor >= 0 && ::flock(descriptor, LOCK_EX | LOCK_NB) == 0;
+    if (is_locked && is_same(descriptor, folder)) return descriptor;
+    if (descriptor >= 0) ::close(descriptor);
+    if (descriptor >= 0 && !is_locked) {
+      return make_error(ErrorCode::InvalidArgument,
+                        fmt::format("{}: is in use by another bake of this asset; wait for it", folder.string()));
+    }
+    // Another bake ended and removed the folder meanwhile: a lock on that one keeps nobody out.
+  }
 }
 
 /// Swaps two folders in one step where the file system can; otherwise moves one aside first.
@@ -117,17 +144,10 @@ Result<BakeWorkspace> BakeWorkspace::open(const fs::path& out_path) {
   if (auto checked = check_replaceable(out); !checked) return tl::unexpected<Error>(checked.error());
   fs::path folder = out;
   folder += ".partial";
+  const auto lock = lock_folder(folder);
+  if (!lock) return tl::unexpected<Error>(lock.error());
+  BakeWorkspace workspace(out, folder, *lock);
   std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) return io_error("create", folder, error);
-  const int lock = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (lock < 0) return io_error("open", folder, std::strerror(errno));
-  if (::flock(lock, LOCK_EX | LOCK_NB) != 0) {
-    ::close(lock);
-    return make_error(ErrorCode::InvalidArgument,
-                      fmt::format("{}: another bake of this asset is running; wait for it", out.string()));
-  }
-  BakeWorkspace workspace(out, folder, lock);
   fs::remove_all(workspace.asset_dir(), error);  // of an interrupted bake
   if (!error) fs::create_directory(workspace.asset_dir(), error);
   if (error) return io_error("create", workspace.asset_dir(), error);

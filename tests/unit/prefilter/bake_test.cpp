@@ -9,11 +9,13 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <thread>
 
 #include "base/hash.h"
 #include "base/parallel.h"
 #include "cache/level_file.h"
 #include "leaf_cloud.h"
+#include "prefilter/bake_workspace.h"
 
 namespace farfield {
 namespace {
@@ -564,6 +566,28 @@ TEST_F(Bake, PassesOnWhatTheMeasureSays) {
   ASSERT_FALSE(report.has_value());
   EXPECT_EQ(report.error().message, "no Embree today");
   EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(Bake, WorkspaceHasOneHolderAtATimeWhileOthersComeAndGo) {
+  std::atomic<int> holders{0}, taken{0};
+  const auto come_and_go = [&] {
+    for (int i = 0; i < 1000; ++i) {
+      auto workspace = BakeWorkspace::open(out());
+      if (!workspace) {
+        ASSERT_EQ(workspace.error().code, ErrorCode::InvalidArgument) << workspace.error().message;
+        continue;
+      }
+      ++taken;
+      ASSERT_EQ(++holders, 1);
+      ASSERT_TRUE(fs::is_directory(workspace->asset_dir()));
+      --holders;
+    }
+  };
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 4; ++i) threads.emplace_back(come_and_go);
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_GT(taken, 0);
+  EXPECT_FALSE(fs::exists(partial()));
 }
 
 TEST_F(Bake, RefusesASecondBakeOfTheSameAssetAtOnce) {
