@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <system_error>
 
 #include "cache/file_io.h"
@@ -34,17 +35,21 @@ bool in_range(const FrameRange& frames, int frame) {
   return frame >= frames.first && frame <= frames.last && (frame - frames.first) % frames.step == 0;
 }
 
-// What an earlier run of the same shot finished, of the frames wanted now. Empty if it was another shot.
-RenderReport finished_before(const fs::path& folder, const std::string& fingerprint, const FrameRange& frames) {
+// The report with some of its frames. If none is left, its memory figures are of nothing and go, too.
+RenderReport keep_frames(RenderReport report, const std::function<bool(int frame)>& is_kept) {
+  std::erase_if(report.frames, [&](const FrameReport& frame) { return !is_kept(frame.frame); });
+  return report.frames.empty() ? RenderReport() : report;
+}
+
+// What earlier runs of the same shot finished, whatever frames they were asked for. Empty if it was another shot.
+RenderReport finished_before(const fs::path& folder, const std::string& fingerprint) {
   const auto text = read_small_file(folder / "shot.json", kMostRecordBytes);
   const auto record = text ? shot_record_from_json(*text) : std::nullopt;
   if (!record || record->fingerprint != fingerprint) return {};
-  RenderReport report = record->report;
-  std::erase_if(report.frames, [&](const FrameReport& frame) {
+  return keep_frames(record->report, [&](int frame) {
     std::error_code ignored;
-    return !in_range(frames, frame.frame) || !fs::exists(frame_path(folder, frame.frame), ignored);
+    return fs::exists(frame_path(folder, frame), ignored);
   });
-  return report.frames.empty() ? RenderReport() : report;
 }
 
 std::vector<int> frames_to_render(const FrameRange& frames, const RenderReport& finished) {
@@ -65,6 +70,13 @@ ContactSheet make_sheet(const FrameRange& frames, int width, int height) {
 }
 
 int sheet_cell(const FrameRange& frames, int frame) { return (frame - frames.first) / frames.step; }
+
+// Puts a finished frame on the sheet. False if it is damaged.
+bool read_into_sheet(ContactSheet& sheet, int cell, const fs::path& frame) {
+  const auto file = read_exr(frame);
+  if (file) sheet.set(cell, file->image);
+  return file.has_value();
+}
 
 }  // namespace
 
@@ -99,15 +111,13 @@ Result<RenderReport> render_shot(const RenderOptions& options, const FrameRange&
 
   // The sheet and the frames of an earlier run are read before memory is measured.
   ContactSheet sheet = make_sheet(frames, options.width, options.height);
-  RenderReport earlier = finished_before(out, fingerprint, frames);
-  std::erase_if(earlier.frames, [&](const FrameReport& frame) {
-    const auto file = read_exr(frame_path(out, frame.frame));
-    if (file) sheet.set(sheet_cell(frames, frame.frame), file->image);
-    return !file;  // damaged: it is rendered again
+  const RenderReport earlier = keep_frames(finished_before(out, fingerprint), [&](int frame) {
+    return !in_range(frames, frame) || read_into_sheet(sheet, sheet_cell(frames, frame), frame_path(out, frame));
   });
   const std::vector<int> missing = frames_to_render(frames, earlier);
-  if (options.message && !earlier.frames.empty())
-    options.message(fmt::format("{} of {} frames are finished already", earlier.frames.size(), frames.count()));
+  const int finished_count = frames.count() - static_cast<int>(missing.size());
+  if (options.message && finished_count > 0)
+    options.message(fmt::format("{} of {} frames are finished already", finished_count, frames.count()));
 
   RenderReport report = earlier;
   const auto take_frame = [&](const Image& image, const Metadata& metadata, const RenderReport& so_far) {
@@ -128,7 +138,7 @@ Result<RenderReport> render_shot(const RenderOptions& options, const FrameRange&
   }
   if (auto written = write_png(out / "contact_sheet.png", sheet.image(), {options.exposure_stops}); !written)
     return tl::unexpected(written.error());
-  return report;
+  return keep_frames(report, [&](int frame) { return in_range(frames, frame); });
 }
 
 }  // namespace farfield

@@ -18,8 +18,10 @@ struct FrameRange {
 Result<FrameRange> parse_frame_range(const std::string& text);
 
 /// Renders the frames into folder `out` (created): frame_NNNN.exr and .png, shot.json rewritten whole after each frame,
-/// contact_sheet.png at the end. Frames that an earlier run with the same options finished are kept and not rendered
-/// again. On Cancelled what is finished stays, and shot.json tells of it.
+/// contact_sheet.png at the end. Frames that earlier runs with the same options finished, of whatever range, are kept
+/// and not rendered again unless their EXR is lost or damaged. shot.json tells of all of them, with the memory figures
+/// of the run that took most; the sheet and the report that is returned have the frames of this range only. On
+/// Cancelled what is finished stays, and shot.json tells of it.
 Result<RenderReport> render_shot(const RenderOptions& options, const FrameRange& frames,
                                  const std::filesystem::path& out);
 

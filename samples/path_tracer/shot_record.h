@@ -9,6 +9,7 @@
 
 namespace farfield {
 
+/// What all runs with one fingerprint have done in a folder.
 struct ShotRecord {
   std::string fingerprint;  ///< FrameRenderer::fingerprint() of the run that wrote it
   RenderReport report;

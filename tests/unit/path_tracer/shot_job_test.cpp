@@ -141,6 +141,22 @@ TEST_F(Shot, SecondRunKeepsFinishedFramesAndRendersTheRest) {
   EXPECT_NE(messages_.find("2 of 3"), std::string::npos);
 }
 
+TEST_F(Shot, RemembersFramesOfOtherRanges) {
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  const auto first_time = time_of("frame_0012.exr");
+  const auto report = shoot({24, 36, 12});
+  ASSERT_TRUE(report);
+  EXPECT_EQ(messages_, "");
+  EXPECT_EQ(report->frames.size(), 2u);
+  const nlohmann::json both = record();
+  EXPECT_EQ(both["frames"].size(), 4u);
+
+  options_.message = [](const std::string& line) { EXPECT_EQ(line, "4 of 4 frames are finished already"); };
+  ASSERT_TRUE(shoot({0, 36, 12}));
+  EXPECT_EQ(time_of("frame_0012.exr"), first_time);
+  EXPECT_EQ(record(), both);
+}
+
 TEST_F(Shot, OtherOptionsRenderEverythingAnew) {
   ASSERT_TRUE(shoot({0, 12, 12}));
   const auto first_time = time_of("frame_0012.exr");
