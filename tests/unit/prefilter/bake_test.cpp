@@ -335,6 +335,21 @@ TEST_F(Bake, BakesAnewWhenSourceOptionsOrFilesHaveChanged) {
   EXPECT_FALSE(fs::exists(partial()));
 }
 
+TEST_F(Bake, BakesAnewWhenAFileIsOfAnotherBake) {
+  ASSERT_TRUE(bake(two_triangles(), "thing", out(), small_options()).has_value());
+  const auto before = files_of(out());
+  ImportedAsset darker = two_triangles();
+  for (FaceMaterial& material : darker.surface.materials) material.diffuse = vec3(0.1f);
+  ASSERT_TRUE(bake(std::move(darker), "thing", folder_ / "darker", small_options()).has_value());
+  fs::copy_file(folder_ / "darker" / "level_0.ffl", out() / "level_0.ffl", fs::copy_options::overwrite_existing);
+  ASSERT_EQ(fs::file_size(out() / "level_0.ffl"), before.at("level_0.ffl").size());
+
+  const auto report = bake(two_triangles(), "thing", out(), small_options());
+  ASSERT_TRUE(report.has_value());
+  EXPECT_FALSE(report->up_to_date);
+  EXPECT_EQ(files_of(out()), before);
+}
+
 TEST_F(Bake, LeavesTheOldAssetAloneUntilTheNewOneIsComplete) {
   ASSERT_TRUE(bake(ball_in_leaves(), "thing", out(), small_options()).has_value());
   const auto before = files_of(out());
