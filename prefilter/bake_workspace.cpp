@@ -15,9 +15,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <regex>
 #include <set>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -43,10 +43,25 @@ fs::path without_trailing_slash(const fs::path& path) {
   return normal.has_filename() ? normal : normal.parent_path();
 }
 
+/// Takes a beginning off a name, if it begins so.
+bool skip(std::string_view& name, std::string_view beginning) {
+  if (!name.starts_with(beginning)) return false;
+  name.remove_prefix(beginning.size());
+  return true;
+}
+
+bool skip_digits(std::string_view& name) {
+  const size_t count = std::min(name.find_first_not_of("0123456789"), name.size());
+  name.remove_prefix(count);
+  return count > 0;
+}
+
 /// Whether an asset's files, or what a write of them that was cut short leaves behind, bear this name.
-bool is_asset_file_name(const std::string& name) {
-  static const std::regex kPattern(R"((manifest\.json|level_[0-9]+\.ffl)(\.tmp-[0-9]+-[0-9]+)?)");
-  return std::regex_match(name, kPattern);
+bool is_asset_file_name(std::string_view name) {
+  const bool is_level = skip(name, "level_") && skip_digits(name) && skip(name, ".ffl");
+  if (!is_level && !skip(name, kManifestName)) return false;
+  if (name.empty()) return true;
+  return skip(name, ".tmp-") && skip_digits(name) && skip(name, "-") && skip_digits(name) && name.empty();
 }
 
 /// Whether a folder with files of these names, all of them asset file names, is an asset. A damaged manifest still
