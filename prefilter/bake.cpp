@@ -32,7 +32,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint32_t kMaxGrid = 4096;       ///< the brick table has (grid / 8)^3 entries
-constexpr uint32_t kVoxelizeVersion = 4;  ///< goes up when voxelize() or pack_volume() give other results
+constexpr uint32_t kVoxelizeVersion = 5;  ///< goes up when voxelize() or pack_volume() give other results
 
 /// Seconds since it was made.
 class Stopwatch {

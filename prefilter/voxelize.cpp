@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <thread>
 
 #include "base/hash.h"
@@ -104,7 +105,8 @@ vec3 scattered_direction(const FaceMaterial& m, const vec3& geometric_normal, co
   const float through = component_sum(m.transmission);
   const float back = component_sum(m.diffuse) + component_sum(m.specular);
   const bool goes_through = unit(0) * (through + back) < through;
-  const vec3 normal = glm::normalize(geometric_normal);
+  // In two steps: the square of a tiny face's normal may be no float.
+  const vec3 normal = glm::normalize(geometric_normal / max_component(glm::abs(geometric_normal)));
   return cosine_lobe((glm::dot(normal, direction) > 0) == goes_through ? normal : -normal, unit(21), unit(42));
 }
 
@@ -134,6 +136,7 @@ struct VoxelRays {
   /// Sends on the light of a hit. What is hidden from where the ray came from, within its length, does not count:
   /// nobody sees it, and the inside of solid twigs is of that kind.
   void scatter(const vec3& origin, const vec3& direction, const RayHit& hit, uint64_t bits) {
+    if (!(max_component(glm::abs(hit.normal)) >= std::numeric_limits<float>::min())) return;  // no face that reflects
     if (scene.is_occluded(origin, -direction, 0, size - hit.distance)) return;
     const FaceMaterial& m = geometry.materials[hit.triangle];
     const vec3 away = scattered_direction(m, hit.normal, direction, bits);

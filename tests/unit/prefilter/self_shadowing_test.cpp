@@ -83,6 +83,24 @@ TEST(SelfShadowing, OfTuftsIsStrong) {
   EXPECT_LT(means_of(voxelized(leaves, 1.0 / 4)).self_shadowing, 0.8);
 }
 
+// At 1e-18 squares of the normals are no floats any more; what Embree still hits there must give sound voxels.
+TEST(SelfShadowing, IsTheSameOnAnyScaleAndFiniteBeyond) {
+  LeafCloud cloud;
+  const Surface leaves = leaf_cloud(cloud);
+  const double expected = means_of(voxelized(leaves, 1.0 / 8)).self_shadowing;
+  for (const float scale : {1e-8f, 1e8f}) {
+    Surface scaled = leaves;
+    for (vec3& p : scaled.positions) p *= scale;
+    EXPECT_NEAR(means_of(voxelized(scaled, double(scale) / 8)).self_shadowing, expected, 1e-3) << scale;
+  }
+  Surface tiny = leaves;
+  for (vec3& p : tiny.positions) p *= 1e-18f;
+  for (const Voxel& v : voxelized(tiny, 1e-18 / 8).voxels) {
+    EXPECT_TRUE(v.self_shadowing > 0 && v.self_shadowing <= 1) << v.self_shadowing;
+    EXPECT_TRUE(v.diffuse.y >= 0 && v.diffuse.y <= 1) << v.diffuse.y;
+  }
+}
+
 // Nothing shadows a plane, while a medium in its place shadows itself.
 TEST(SelfShadowing, OfAPlaneIsAGainThatLeavesWhiteAlone) {
   Surface plane;
