@@ -263,7 +263,8 @@ TEST_F(WholeRoad, VerifyAcceptsTheAssetAndFindsABrokenByteInEveryLevel) {
   const ProcessOutput good = farfield({"verify", asset});
   EXPECT_EQ(good.exit_code, 0);
   EXPECT_EQ(good.err, "");
-  for (const Json& level : Json::parse(farfield({"info", asset, "--json"}).out)["levels"]) {
+  const Json info = Json::parse(farfield({"info", asset, "--json"}).out);
+  for (const Json& level : info["levels"]) {
     const fs::path broken = folder / "broken.farfield", file = broken / level["file"].get<std::string>();
     fs::remove_all(broken);
     fs::copy(asset, broken, fs::copy_options::recursive);
