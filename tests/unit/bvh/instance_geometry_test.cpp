@@ -285,7 +285,10 @@ TEST(InstanceGeometry, PacketsAndStreamsSeeTheSameDistancesAsSingleRays) {
       EXPECT_EQ(ray.hit.primID, single[i].hit.primID) << what << " " << i;
     }
   };
-  const auto packets = [&]<typename RayHitN>(RayHitN, unsigned n, auto trace, const char* what) {
+  // Embree 3.13 traces packets that are wider than the machine's registers ray by ray, inactive lanes too.
+  const auto packets = [&]<typename RayHitN>(RayHitN, unsigned n, auto trace, const char* what,
+                                             RTCDeviceProperty native) {
+    const bool is_native = rtcGetDeviceProperty(rtcGetSceneDevice(scene), native) != 0;
     for (unsigned base = 0; base < kRays; base += n) {
       RayHitN packet;
       alignas(64) int valid[16];
@@ -306,18 +309,21 @@ TEST(InstanceGeometry, PacketsAndStreamsSeeTheSameDistancesAsSingleRays) {
           got.ray.tfar = RTCRayN_tfar(reinterpret_cast<RTCRayN*>(&packet.ray), n, lane);
           got.hit = rtcGetHitFromHitN(reinterpret_cast<RTCHitN*>(&packet.hit), n, lane);
           expect_same(got, base + lane, what);
-        } else {
+        } else if (is_native) {
           EXPECT_EQ(RTCRayN_tfar(reinterpret_cast<RTCRayN*>(&packet.ray), n, lane), kInf) << what;
         }
       }
     }
   };
   packets(
-      RTCRayHit4{}, 4, [&](int* v, RTCRayHit4* p) { rtcIntersect4(v, scene, &context.embree, p); }, "4");
+      RTCRayHit4{}, 4, [&](int* v, RTCRayHit4* p) { rtcIntersect4(v, scene, &context.embree, p); }, "4",
+      RTC_DEVICE_PROPERTY_NATIVE_RAY4_SUPPORTED);
   packets(
-      RTCRayHit8{}, 8, [&](int* v, RTCRayHit8* p) { rtcIntersect8(v, scene, &context.embree, p); }, "8");
+      RTCRayHit8{}, 8, [&](int* v, RTCRayHit8* p) { rtcIntersect8(v, scene, &context.embree, p); }, "8",
+      RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED);
   packets(
-      RTCRayHit16{}, 16, [&](int* v, RTCRayHit16* p) { rtcIntersect16(v, scene, &context.embree, p); }, "16");
+      RTCRayHit16{}, 16, [&](int* v, RTCRayHit16* p) { rtcIntersect16(v, scene, &context.embree, p); }, "16",
+      RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED);
 
   for (const RTCIntersectContextFlags flags :
        {RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT, RTC_INTERSECT_CONTEXT_FLAG_COHERENT}) {
