@@ -58,8 +58,11 @@ bool skip_digits(std::string_view& name) {
 
 /// Whether an asset's files, or what a write of them that was cut short leaves behind, bear this name.
 bool is_asset_file_name(std::string_view name) {
-  const bool is_level = skip(name, "level_") && skip_digits(name) && skip(name, ".ffl");
-  if (!is_level && !skip(name, kManifestName)) return false;
+  if (skip(name, "level_")) {
+    if (!skip_digits(name) || !skip(name, ".ffl")) return false;
+  } else if (!skip(name, kManifestName)) {
+    return false;
+  }
   if (name.empty()) return true;
   return skip(name, ".tmp-") && skip_digits(name) && skip(name, "-") && skip_digits(name) && name.empty();
 }

@@ -74,9 +74,7 @@ struct Runtime::Impl final : LevelSource {
   Result<AssetId> open(const std::filesystem::path& folder);
   Result<void> load_root(OpenAsset& asset);
   Result<Plan> plan_roots(const OpenAsset& newcomer) const;
-  void update_footprints();
-  std::vector<float> camera_footprints() const;
-  void restore(const std::vector<float>& camera_footprints);
+  void update_footprints(const std::vector<FootprintCamera>& of_cameras);
   std::vector<PlanAsset> plan_assets() const;
   PlanAsset plan_asset(const OpenAsset& asset) const;
   void apply(const Plan& plan);
@@ -97,6 +95,7 @@ struct Runtime::Impl final : LevelSource {
   const RuntimeOptions options;
   std::mutex sink_mutex;  ///< one message at a time
   std::vector<FootprintCamera> cameras;
+  std::vector<FootprintCamera> planned_cameras;  ///< those of the plan in force
   RTCDevice host_device;
   std::unique_ptr<BvhDevice> device;
   std::vector<std::unique_ptr<OpenAsset>> assets;
@@ -214,28 +213,15 @@ Result<Plan> Runtime::Impl::plan_roots(const OpenAsset& newcomer) const {
 
 // --- Plans -----------------------------------------------------------------------------------------------------------
 
-void Runtime::Impl::update_footprints() {
+void Runtime::Impl::update_footprints(const std::vector<FootprintCamera>& of_cameras) {
   constexpr size_t kGrain = 1024;
   parallel_for(geometry.instances.size(), kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       InstanceRecord& instance = geometry.instances[i];
       const Box3 bounds = instance_bounds(instance, *geometry.assets[instance.asset]);
-      instance.footprint.camera_footprint = cameras.empty() ? 0.0f : finest_footprint(cameras, bounds);
+      instance.footprint.camera_footprint = of_cameras.empty() ? 0.0f : finest_footprint(of_cameras, bounds);
     }
   });
-}
-
-std::vector<float> Runtime::Impl::camera_footprints() const {
-  std::vector<float> footprints;
-  footprints.reserve(geometry.instances.size());
-  for (const InstanceRecord& instance : geometry.instances) footprints.push_back(instance.footprint.camera_footprint);
-  return footprints;
-}
-
-void Runtime::Impl::restore(const std::vector<float>& camera_footprints) {
-  for (size_t i = 0; i < camera_footprints.size(); ++i) {
-    geometry.instances[i].footprint.camera_footprint = camera_footprints[i];
-  }
 }
 
 /// The lambda that the cameras ask for on an instance, at least 0, not clamped to what there is.
@@ -411,13 +397,13 @@ Result<PlanSummary> Runtime::plan_frame() {
     return make_error(ErrorCode::InvalidArgument, "plan_frame() needs a camera: call set_cameras() before");
   }
   impl.loader.forget();  // plan with sizes that no longer change
-  const std::vector<float> former_footprints = impl.camera_footprints();
-  impl.update_footprints();
+  impl.update_footprints(impl.cameras);
   const auto plan = plan_levels(impl.plan_assets(), impl.options.budget_bytes, impl.fixed_bytes());
   if (!plan) {
-    impl.restore(former_footprints);
+    impl.update_footprints(impl.planned_cameras);  // the former plan stays
     return tl::unexpected(plan.error());
   }
+  impl.planned_cameras = impl.cameras;
   impl.apply(*plan);
 
   PlanSummary summary;
