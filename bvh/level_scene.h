@@ -42,12 +42,6 @@ class LevelScene {
   uint64_t build_peak_bytes_ = 0;
 };
 
-/// What a level costs a host, as the manifest records it.
-struct LevelCost {
-  uint64_t resident_bytes = 0;    ///< file pages that stay, BVH, overheads
-  uint64_t build_peak_bytes = 0;  ///< further bytes while it is loaded: pages that only the load reads, Embree's own
-};
-
 /// The cost of a level in a mapped file whose build pages were released (LevelFile::release_build_pages), with `scene`.
 LevelCost level_cost(const LevelView& level, const LevelScene& scene);
 

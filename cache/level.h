@@ -142,4 +142,10 @@ struct LevelView : LevelArrays<ArrayView> {
 };
 LevelView view_of(const LevelData& level);
 
+/// What a level costs a host, as the manifest records it.
+struct LevelCost {
+  uint64_t resident_bytes = 0;    ///< file pages that stay, BVH, overheads
+  uint64_t build_peak_bytes = 0;  ///< further bytes while it is loaded: pages that only the load reads, Embree's own
+};
+
 }  // namespace farfield

@@ -9,8 +9,8 @@
 #include <system_error>
 #include <vector>
 
+#include "base/file_io.h"
 #include "base/hash.h"
-#include "cache/file_io.h"
 #include "cache/level_check.h"
 #include "cache/level_format.h"
 

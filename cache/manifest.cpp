@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "base/file_io.h"
 #include "base/hash.h"
-#include "cache/file_io.h"
 
 namespace farfield {
 

@@ -27,11 +27,11 @@ int wrap(int i, int size, Wrap mode) {
   return ((i % size) + size) % size;
 }
 
-vec4 fetch(const SourceTexture& texture, const Image::Level& level, int x, int y) {
+vec4 fetch(const SourceTexture& texture, const Texture::Level& level, int x, int y) {
   return texture.image->texel(level, wrap(x, level.width, texture.wrap_u), wrap(y, level.height, texture.wrap_v));
 }
 
-vec4 sample_bilinear(const SourceTexture& texture, const Image::Level& level, vec2 uv) {
+vec4 sample_bilinear(const SourceTexture& texture, const Texture::Level& level, vec2 uv) {
   const float x = uv.x * static_cast<float>(level.width) - 0.5f, y = uv.y * static_cast<float>(level.height) - 0.5f;
   const float x0 = std::floor(x), y0 = std::floor(y);
   const int ix = static_cast<int>(x0), iy = static_cast<int>(y0);
@@ -41,7 +41,7 @@ vec4 sample_bilinear(const SourceTexture& texture, const Image::Level& level, ve
 }
 
 /// The level whose texels are about as large as those of a `width` texels wide image.
-const Image::Level& matching_level(const Image& image, int width) {
+const Texture::Level& matching_level(const Texture& image, int width) {
   int level = 0;
   while (level + 1 < image.level_count() && image.level(level).width > width) ++level;
   return image.level(level);
@@ -96,7 +96,7 @@ class Accumulator {
 /// Samples a material at texels of its driving texture.
 class TexelWalk {
  public:
-  TexelWalk(const SourceMaterial& material, const Image::Level& level)
+  TexelWalk(const SourceMaterial& material, const Texture::Level& level)
       : texture_(driver(material)),
         level_(level),
         drives_color_(bool(material.base_color_map)),
@@ -112,7 +112,7 @@ class TexelWalk {
 
  private:
   const SourceTexture& texture_;
-  const Image::Level& level_;
+  const Texture::Level& level_;
   bool drives_color_;
   Accumulator sums_;
 };
@@ -167,11 +167,11 @@ void rasterize(const std::array<glm::dvec2, 3>& p, const Visit& visit) {
 }
 
 TextureAverage average_whole(const SourceMaterial& material) {
-  const Image& image = *driver(material).image;
+  const Texture& image = *driver(material).image;
   // Down to about 32 x 32 texels, so that products of textures are still taken texel by texel.
   int index = 0;
   while (index + 1 < image.level_count() && image.level(index).width > 32) ++index;
-  const Image::Level& level = image.level(index);
+  const Texture::Level& level = image.level(index);
   TexelWalk walk(material, level);
   for (int y = 0; y < level.height; ++y) {
     for (int x = 0; x < level.width; ++x) walk.add_texel(x, y, 1);
@@ -200,15 +200,15 @@ TextureAverage average_textures(const SourceMaterial& material, const UvTriangle
   }
   if (!is_usable(uv)) return average_whole(material);
 
-  const Image& image = *driver(material).image;
-  const auto to_texels = [&](const Image::Level& level) {
+  const Texture& image = *driver(material).image;
+  const auto to_texels = [&](const Texture::Level& level) {
     std::array<glm::dvec2, 3> p;
     for (size_t k = 0; k < 3; ++k) p[k] = glm::dvec2(uv[k]) * glm::dvec2(level.width, level.height);
     return p;
   };
   // Half the level until the texels that the triangle's box touches are few enough.
   int index = 0;
-  const auto is_too_many = [&](const Image::Level& level) {
+  const auto is_too_many = [&](const Texture::Level& level) {
     const auto p = to_texels(level);
     const auto xs = std::minmax({p[0].x, p[1].x, p[2].x}), ys = std::minmax({p[0].y, p[1].y, p[2].y});
     return (xs.second - xs.first + 2) * (ys.second - ys.first + 2) > 2 * kMaxTexels;
@@ -217,7 +217,7 @@ TextureAverage average_textures(const SourceMaterial& material, const UvTriangle
   // Still too many of single texels: the texture repeats thousands of times within the triangle.
   if (is_too_many(image.level(index))) return average_whole(material);
 
-  const Image::Level& level = image.level(index);
+  const Texture::Level& level = image.level(index);
   const auto p = to_texels(level);
   TexelWalk walk(material, level);
   const double area = 0.5 * std::abs((p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x));

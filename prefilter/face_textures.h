@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "prefilter/source_mesh.h"
+#include "import/source_mesh.h"
 #include "prefilter/surface.h"
 
 namespace farfield {

@@ -19,11 +19,11 @@
 #include "base/parallel.h"
 #include "bvh/bvh_device.h"
 #include "bvh/instance_geometry.h"
+#include "cache/loader_thread.h"
 #include "cache/residency.h"
 #include "lodselect/footprint.h"
 #include "lodselect/planner.h"
 #include "runtime/interaction_model.h"
-#include "runtime/loader_thread.h"
 #include "runtime/open_asset.h"
 
 namespace farfield {

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include "bake/bake.h"
 #include "base/bytes.h"
 #include "base/parallel.h"
-#include "prefilter/bake.h"
-#include "samples/evaluate/resident_cost.h"
-#include "samples/path_tracer/progress.h"
 #include "tools/commands.h"
 #include "tools/console.h"
 #include "tools/flags.h"
 #include "tools/interrupt.h"
+#include "tools/progress.h"
 #include "tools/report_json.h"
 
 namespace farfield::tool {
@@ -34,7 +33,6 @@ Result<void> run_bake(BakeArguments& arguments) {
     return writable;
   const ThreadLimit limit(arguments.threads);
   ProgressLine progress;
-  arguments.options.measure_resident = measure_resident;
   arguments.options.progress = [&](const std::string& stage, double done) { progress.update(done, stage); };
   arguments.options.cancel = &catch_interrupts();
 

@@ -10,7 +10,7 @@
 #include <cstring>
 #include <span>
 
-#include "cache/file_io.h"
+#include "base/file_io.h"
 
 namespace farfield::tool {
 namespace fs = std::filesystem;

@@ -2,13 +2,13 @@
 #include <fmt/format.h>
 
 #include "base/parallel.h"
-#include "samples/evaluate/evaluate.h"
-#include "samples/path_tracer/progress.h"
+#include "evaluate/evaluate.h"
 #include "tools/args.h"
 #include "tools/commands.h"
 #include "tools/console.h"
 #include "tools/flags.h"
 #include "tools/interrupt.h"
+#include "tools/progress.h"
 
 namespace farfield::tool {
 namespace {

@@ -5,11 +5,11 @@
 
 #include "base/bytes.h"
 #include "base/parallel.h"
-#include "samples/path_tracer/progress.h"
 #include "tools/args.h"
 #include "tools/console.h"
 #include "tools/flags.h"
 #include "tools/interrupt.h"
+#include "tools/progress.h"
 
 namespace farfield::tool {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "samples/path_tracer/render_job.h"
+#include "path_tracer/render_job.h"
 
 namespace CLI {
 class App;

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "prefilter/bake.h"
+#include "bake/bake.h"
 
 namespace farfield::tool {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "samples/path_tracer/shot_job.h"
+#include "path_tracer/shot_job.h"
 
 #include <fmt/format.h>
 

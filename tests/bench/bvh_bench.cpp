@@ -10,7 +10,7 @@
 #include <memory>
 
 #include "bvh/instance_geometry.h"
-#include "unit/bvh/test_levels.h"
+#include "tests/support/test_levels.h"
 
 namespace farfield {
 namespace {

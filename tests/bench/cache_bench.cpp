@@ -4,10 +4,10 @@
 //   --benchmark_repetitions=9 --benchmark_enable_random_interleaving --benchmark_report_aggregates_only
 #include <benchmark/benchmark.h>
 
-#include "cache/file_io.h"
+#include "base/file_io.h"
 #include "cache/level_file.h"
 #include "cache/residency.h"
-#include "unit/cache/sample_asset.h"
+#include "tests/support/sample_asset.h"
 
 namespace farfield {
 namespace {

@@ -10,8 +10,8 @@
 
 #include <cmath>
 
-#include "samples/evaluate/views.h"
-#include "samples/path_tracer/asset_view.h"
+#include "evaluate/views.h"
+#include "path_tracer/asset_view.h"
 
 namespace farfield {
 namespace {

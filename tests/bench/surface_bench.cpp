@@ -5,7 +5,7 @@
 
 #include "prefilter/macrosurface.h"
 #include "prefilter/simplify.h"
-#include "unit/prefilter/test_surfaces.h"
+#include "tests/support/test_surfaces.h"
 
 namespace farfield {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The readers of foreign files on arbitrary bytes. FARFIELD_FUZZ_READER is the one under test:
 //   build/fuzz/bin/ply_fuzz -max_total_time=60 -rss_limit_mb=2048 CORPUS tests/data/nasty
-#include "prefilter/read_formats.h"
+#include "import/read_formats.h"
 
 #ifdef FARFIELD_FUZZ_GLTF
 static auto read(std::span<const unsigned char> bytes) { return farfield::read_gltf(bytes, "fuzz.glb", -1); }

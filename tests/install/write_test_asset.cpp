@@ -2,8 +2,8 @@
 // write_test_asset FOLDER: a small asset for tests that run other programs.
 #include <cstdio>
 
-#include "unit/bvh/test_levels.h"
-#include "unit/runtime/test_asset.h"
+#include "tests/support/test_asset.h"
+#include "tests/support/test_levels.h"
 
 int main(int argc, char** argv) {
   if (argc != 2) {

@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "small_assets.h"
-#include "subprocess.h"
+#include "tests/support/small_assets.h"
+#include "tests/support/subprocess.h"
 
 namespace farfield {
 namespace {

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "base/hash.h"
-#include "unit/bvh/test_levels.h"
+#include "tests/support/test_levels.h"
 
 namespace farfield {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "base/hash.h"
 #include "base/parallel.h"
-#include "unit/bvh/test_levels.h"
+#include "tests/support/test_levels.h"
 
 namespace farfield {
 namespace {

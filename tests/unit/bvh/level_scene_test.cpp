@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "base/parallel.h"
-#include "unit/bvh/test_levels.h"
+#include "tests/support/test_levels.h"
 
 namespace farfield {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "cache/file_io.h"
+#include "base/file_io.h"
 
 #include <gtest/gtest.h>
 #include <sys/mount.h>
@@ -10,8 +10,8 @@
 
 #include "cache/level_file.h"
 #include "cache/manifest.h"
-#include "file_size_limit.h"
-#include "sample_asset.h"
+#include "tests/support/file_size_limit.h"
+#include "tests/support/sample_asset.h"
 
 namespace farfield {
 namespace {

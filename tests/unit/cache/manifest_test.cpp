@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/random.h"
-#include "sample_asset.h"
+#include "tests/support/sample_asset.h"
 
 namespace farfield {
 namespace {

@@ -10,7 +10,7 @@
 #include "cache/level_file.h"
 #include "cache/level_format.h"
 #include "cache/manifest.h"
-#include "sample_asset.h"
+#include "tests/support/sample_asset.h"
 
 namespace farfield {
 namespace {

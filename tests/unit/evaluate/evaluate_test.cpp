@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The parts of an evaluation that need no asset; the whole is tested through the command (tests/integration).
-#include "samples/evaluate/evaluate.h"
+#include "evaluate/evaluate.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Errors of synthetic pictures whose true errors and noise are known.
-#include "samples/evaluate/metrics.h"
+#include "evaluate/metrics.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "samples/evaluate/sheet.h"
+#include "evaluate/sheet.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <set>
 
-#include "samples/evaluate/label.h"
+#include "evaluate/label.h"
 
 namespace farfield {
 namespace {

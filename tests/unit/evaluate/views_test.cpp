@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "samples/evaluate/views.h"
+#include "evaluate/views.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "samples/path_tracer/asset_library.h"
+#include "path_tracer/asset_library.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <iterator>
 #include <thread>
 
-#include "tests/unit/cache/sample_asset.h"
+#include "tests/support/sample_asset.h"
 
 namespace farfield {
 namespace {

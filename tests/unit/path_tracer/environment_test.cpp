@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "samples/path_tracer/environment.h"
+#include "path_tracer/environment.h"
 
 #include <gtest/gtest.h>
 
-#include "samples/path_tracer/preetham_sky.h"
-#include "tests/unit/cache/sample_asset.h"
-#include "tests/unit/scattering/statistics.h"
+#include "path_tracer/preetham_sky.h"
+#include "tests/support/sample_asset.h"
+#include "tests/support/statistics.h"
 
 namespace farfield {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "samples/path_tracer/film.h"
+#include "path_tracer/film.h"
 
 #include <gtest/gtest.h>
 

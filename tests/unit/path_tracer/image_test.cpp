@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "samples/path_tracer/image.h"
+#include "path_tracer/image.h"
 
 #include <OpenImageIO/imageio.h>
 #include <gtest/gtest.h>
@@ -7,8 +7,8 @@
 #include <fstream>
 
 #include "base/random.h"
-#include "tests/unit/cache/file_size_limit.h"
-#include "tests/unit/cache/sample_asset.h"
+#include "tests/support/file_size_limit.h"
+#include "tests/support/sample_asset.h"
 
 namespace farfield {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The path tracer against the real Runtime: a white sphere whose levels are meshes, haze and dense voxels.
-#include "samples/path_tracer/integrator.h"
+#include "path_tracer/integrator.h"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 #include <cstring>
 
 #include "base/parallel.h"
-#include "samples/path_tracer/asset_view.h"
-#include "samples/path_tracer/embree_handles.h"
-#include "tests/unit/path_tracer/image_statistics.h"
-#include "tests/unit/runtime/test_asset.h"
+#include "path_tracer/asset_view.h"
+#include "path_tracer/embree_handles.h"
+#include "tests/support/image_statistics.h"
+#include "tests/support/test_asset.h"
 
 namespace farfield {
 namespace {

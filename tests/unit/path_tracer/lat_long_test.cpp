@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "samples/path_tracer/lat_long.h"
+#include "path_tracer/lat_long.h"
 
 #include <gtest/gtest.h>
 
-#include "tests/unit/scattering/statistics.h"
+#include "tests/support/statistics.h"
 
 namespace farfield {
 namespace {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "samples/path_tracer/scene_setup.h"
+#include "path_tracer/scene_setup.h"
 
 #include <gtest/gtest.h>
 
-#include "samples/path_tracer/image.h"
-#include "tests/unit/cache/sample_asset.h"
+#include "path_tracer/image.h"
+#include "tests/support/sample_asset.h"
 
 namespace farfield {
 namespace {

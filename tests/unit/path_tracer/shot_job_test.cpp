@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "samples/path_tracer/shot_job.h"
+#include "path_tracer/shot_job.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "samples/path_tracer/image.h"
-#include "tests/unit/cache/sample_asset.h"
-#include "tests/unit/runtime/test_asset.h"
+#include "path_tracer/image.h"
+#include "tests/support/sample_asset.h"
+#include "tests/support/test_asset.h"
 
 namespace farfield {
 namespace {

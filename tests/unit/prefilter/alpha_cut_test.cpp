@@ -9,9 +9,9 @@
 #include <random>
 
 #include "base/parallel.h"
-#include "gltf_files.h"
-#include "png_files.h"
-#include "prefilter/import.h"
+#include "prefilter/condition.h"
+#include "tests/support/gltf_files.h"
+#include "tests/support/png_files.h"
 
 namespace farfield {
 namespace {
@@ -30,7 +30,7 @@ SourceMaterial masked(int n, const AlphaAt& alpha) {
   }
   SourceMaterial m;
   m.is_masked = true;
-  m.base_color_map = {std::make_shared<const Image>(n, n, texels), Wrap::Clamp, Wrap::Clamp};
+  m.base_color_map = {std::make_shared<const Texture>(n, n, texels), Wrap::Clamp, Wrap::Clamp};
   return m;
 }
 
@@ -77,7 +77,7 @@ TEST(AlphaCut, CoverageOfRandomBlobsIsTheShareOfTexelsAboveTheCutoff) {
     };
     const int n = 256;
     const SourceMaterial m = masked(n, [&](float u, float v) { return 0.5f + wave(u, v); });
-    const Image& im = *m.base_color_map.image;
+    const Texture& im = *m.base_color_map.image;
     double share = 0;
     for (int i = 0; i < n * n; ++i) share += im.texel(im.level(0), i % n, i / n).w >= 0.5f ? 1.0 / (n * n) : 0;
     EXPECT_NEAR(card_coverage(m), share, 0.01 * share + 1e-4) << "run " << run;

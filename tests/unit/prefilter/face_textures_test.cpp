@@ -8,12 +8,12 @@
 namespace farfield {
 namespace {
 
-std::shared_ptr<const Image> image(int width, int height, const std::vector<vec4>& texels) {
-  return std::make_shared<const Image>(width, height, texels);
+std::shared_ptr<const Texture> image(int width, int height, const std::vector<vec4>& texels) {
+  return std::make_shared<const Texture>(width, height, texels);
 }
 
 /// Random texels; alpha too if asked.
-std::shared_ptr<const Image> noise_image(int width, int height, bool with_alpha) {
+std::shared_ptr<const Texture> noise_image(int width, int height, bool with_alpha) {
   std::mt19937 rng(7);
   std::uniform_real_distribution<float> any(0, 1);
   std::vector<vec4> texels;
@@ -21,7 +21,7 @@ std::shared_ptr<const Image> noise_image(int width, int height, bool with_alpha)
   return image(width, height, texels);
 }
 
-SourceMaterial textured(std::shared_ptr<const Image> base) {
+SourceMaterial textured(std::shared_ptr<const Texture> base) {
   SourceMaterial m;
   m.base_color = vec3(1.0f);
   m.base_color_map.image = std::move(base);
@@ -68,7 +68,7 @@ TEST(FaceTextures, PartsAverageToTheWhole) {
     const auto alpha_of = [&](const UvTriangle& t) {
       SourceMaterial as_color = textured(image(32, 32, [&] {
         std::vector<vec4> texels;
-        const Image& im = *m.base_color_map.image;
+        const Texture& im = *m.base_color_map.image;
         for (int i = 0; i < 32 * 32; ++i) texels.emplace_back(vec3(im.texel(im.level(0), i % 32, i / 32).w), 1.0f);
         return texels;
       }()));

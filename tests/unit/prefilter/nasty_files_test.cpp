@@ -7,9 +7,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "gltf_files.h"
-#include "prefilter/gltf_scene.h"
-#include "prefilter/import.h"
+#include "import/gltf_scene.h"
+#include "prefilter/condition.h"
+#include "tests/support/gltf_files.h"
 
 namespace farfield {
 namespace {

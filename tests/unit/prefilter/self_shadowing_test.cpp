@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "leaf_cloud.h"
 #include "prefilter/voxelize.h"
+#include "tests/support/leaf_cloud.h"
 
 namespace farfield {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <functional>
 
-#include "prefilter/import.h"
+#include "prefilter/condition.h"
 
 namespace farfield {
 namespace {

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "cache/level.h"
-#include "prefilter/import.h"
+#include "prefilter/condition.h"
 #include "prefilter/macrosurface.h"
 #include "prefilter/simplify.h"
-#include "test_surfaces.h"
+#include "tests/support/test_surfaces.h"
 
 namespace farfield {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
-#include "leaf_cloud.h"
 #include "prefilter/density.h"
+#include "tests/support/leaf_cloud.h"
 
 namespace farfield {
 namespace {

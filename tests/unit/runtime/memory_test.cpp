@@ -12,8 +12,8 @@
 
 #include "base/bytes.h"
 #include "base/parallel.h"
-#include "unit/bvh/test_levels.h"
-#include "unit/runtime/test_asset.h"
+#include "tests/support/test_asset.h"
+#include "tests/support/test_levels.h"
 
 namespace farfield {
 namespace {

@@ -12,8 +12,8 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 #include "cache/manifest.h"
-#include "unit/bvh/test_levels.h"
-#include "unit/runtime/test_asset.h"
+#include "tests/support/test_asset.h"
+#include "tests/support/test_levels.h"
 
 namespace farfield {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "scattering/flake_phase.h"
 #include "scattering/surface_bsdf.h"
-#include "statistics.h"
+#include "tests/support/statistics.h"
 
 namespace farfield {
 namespace {

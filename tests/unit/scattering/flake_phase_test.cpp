@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "scattering/albedo.h"
-#include "statistics.h"
+#include "tests/support/statistics.h"
 
 namespace farfield {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "scattering/fresnel.h"
 #include "scattering/microfacet_brdf.h"
-#include "statistics.h"
+#include "tests/support/statistics.h"
 
 namespace farfield {
 namespace {

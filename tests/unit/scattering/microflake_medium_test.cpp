@@ -5,7 +5,7 @@
 
 #include "scattering/carlson.h"
 #include "scattering/lobe_fit.h"
-#include "statistics.h"
+#include "tests/support/statistics.h"
 
 namespace farfield {
 namespace {

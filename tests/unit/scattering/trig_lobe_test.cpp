@@ -5,7 +5,7 @@
 
 #include <numeric>
 
-#include "statistics.h"
+#include "tests/support/statistics.h"
 
 namespace farfield {
 namespace {

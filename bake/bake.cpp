@@ -1,0 +1,435 @@
+// SPDX-License-Identifier: Apache-2.0
+// The cascade of thesis 6.4. Level k is made from level k-1: its surface is split into macrosurface, which is
+// simplified, and sub-resolution geometry, which joins all such geometry of finer levels, in the form in which it left
+// the surface; all of it is voxelised afresh at r_k.
+#include "bake/bake.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "bake/bake_workspace.h"
+#include "bake/pack_level.h"
+#include "bake/slab_hull.h"
+#include "base/file_io.h"
+#include "base/hash.h"
+#include "bvh/level_scene.h"
+#include "cache/level_file.h"
+#include "prefilter/macrosurface.h"
+#include "prefilter/simplify.h"
+#include "prefilter/voxelize.h"
+
+namespace farfield {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr uint32_t kMaxGrid = 4096;       ///< the brick table has (grid / 8)^3 entries
+constexpr uint32_t kVoxelizeVersion = 5;  ///< goes up when voxelize() or pack_volume() give other results
+
+/// Seconds since it was made.
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now();
+};
+
+Result<void> check_options(const BakeOptions& options) {
+  const uint32_t finest = options.finest_grid, coarsest = options.coarsest_grid;
+  if (!std::has_single_bit(finest) || !std::has_single_bit(coarsest) || finest < coarsest || finest > kMaxGrid) {
+    return make_error(ErrorCode::InvalidArgument,
+                      fmt::format("bake: grids must be powers of two with 1 <= coarsest <= finest <= {}, not {} to {}",
+                                  kMaxGrid, finest, coarsest));
+  }
+  if (options.rays_per_voxel == 0) return make_error(ErrorCode::InvalidArgument, "bake: rays per voxel must be > 0");
+  return {};
+}
+
+/// Equal text and source hash give equal bytes.
+std::string canonical_options(const BakeOptions& options) {
+  if (options.source_only) return fmt::format("source_only=1 mesh={}", options.import.mesh);
+  return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} mesh={} voxelize={}", options.finest_grid,
+                     options.coarsest_grid, options.rays_per_voxel, options.import.mesh, kVoxelizeVersion);
+}
+
+/// The manifest of `out`, if it is whole and was baked from the same source with the same options by this version.
+std::optional<Manifest> find_up_to_date(const fs::path& out, const Manifest& wanted) {
+  auto manifest = read_manifest(out);
+  if (!manifest || manifest->source_hash != wanted.source_hash || manifest->options != wanted.options ||
+      manifest->generator != wanted.generator || manifest->source != wanted.source) {
+    return std::nullopt;
+  }
+  for (const LevelEntry& entry : manifest->levels) {
+    const auto file = LevelFile::open(out / entry.file, LevelCheck::Full);
+    // The check has read the whole file already, so that the hash costs next to nothing. It tells a sound file of
+    // another bake.
+    if (!file || (*file)->file_bytes() != entry.file_bytes) return std::nullopt;
+    if (hash_bytes((*file)->bytes()) != entry.file_hash) return std::nullopt;
+  }
+  return std::move(*manifest);
+}
+
+/// Where vertices and faces of one surface are in another.
+MorphMaps identity_maps(const Surface& surface) {
+  MorphMaps maps;
+  for (uint32_t v = 0; v < surface.positions.size(); ++v) maps.vertex.push_back(v);
+  for (uint32_t f = 0; f < surface.triangles.size(); ++f) maps.face.push_back(f);
+  return maps;
+}
+
+void compose(std::vector<uint32_t>& first, const std::vector<uint32_t>& then) {
+  for (uint32_t& i : first) {
+    if (i != kMorphVoxelized && i != kMorphCollapsed) i = then[i];
+  }
+}
+
+/// A surface in two parts. Of `macrosurface` all vertices are kept, so that their numbers stay.
+struct SplitSurface {
+  Surface macrosurface;
+  std::vector<uint32_t> macro_face;  ///< for each face of the whole: its number in macrosurface, or kMorphVoxelized
+};
+
+/// Moves the faces that are not macrosurface behind those of `sub_resolution`.
+SplitSurface split(const Surface& surface, const std::vector<uint8_t>& is_macrosurface, Surface& sub_resolution) {
+  SplitSurface result;
+  result.macrosurface.positions = surface.positions;
+  result.macrosurface.origin = surface.origin;
+  std::vector<uint32_t> moved(surface.positions.size(), kUnused);
+  for (size_t f = 0; f < surface.triangles.size(); ++f) {
+    if (is_macrosurface[f]) {
+      result.macro_face.push_back(static_cast<uint32_t>(result.macrosurface.triangles.size()));
+      result.macrosurface.triangles.push_back(surface.triangles[f]);
+      result.macrosurface.materials.push_back(surface.materials[f]);
+      continue;
+    }
+    result.macro_face.push_back(kMorphVoxelized);
+    uvec3 triangle = surface.triangles[f];
+    for (int c = 0; c < 3; ++c) {
+      uint32_t& vertex = moved[triangle[c]];
+      if (vertex == kUnused) {
+        vertex = static_cast<uint32_t>(sub_resolution.positions.size());
+        sub_resolution.positions.push_back(surface.positions[triangle[c]]);
+      }
+      triangle[c] = vertex;
+    }
+    sub_resolution.triangles.push_back(triangle);
+    sub_resolution.materials.push_back(surface.materials[f]);
+  }
+  return result;
+}
+
+/// Everything that a packed volume depends on.
+uint64_t volume_key(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options) {
+  uint64_t key = mix64(kVoxelizeVersion, mix64(options.rays_per_voxel, options.seed));
+  const std::array<double, 4> place = {lattice.origin.x, lattice.origin.y, lattice.origin.z, lattice.voxel_size};
+  key = hash_values<double>(place, key);
+  key = hash_values<vec3>(geometry.positions, key);
+  key = hash_values<uvec3>(geometry.triangles, key);
+  return hash_values<FaceMaterial>(geometry.materials, key);
+}
+
+/// Less than what a level with such a volume and surface has resident.
+uint64_t least_bytes(const VolumeSize& volume, const Surface& voxelized, const Surface& surface) {
+  constexpr uint64_t kTriangle = 20;  // a BVH of quads takes more, without any array of ours
+  const auto any = [&](vec3 FaceMaterial::*channel) {
+    return std::any_of(voxelized.materials.begin(), voxelized.materials.end(),
+                       [&](const FaceMaterial& m) { return max_component(m.*channel) > 0; });
+  };
+  uint64_t per_voxel = sizeof(PackedFlakeSggx);
+  if (any(&FaceMaterial::diffuse)) per_voxel += sizeof(PackedColor);
+  if (any(&FaceMaterial::specular)) per_voxel += sizeof(PackedColor) + 1;
+  if (any(&FaceMaterial::transmission)) per_voxel += sizeof(PackedColor);
+  const uint64_t bytes =
+      per_voxel * volume.voxels + sizeof(Brick) * volume.bricks + kTriangle * surface.triangles.size();
+  return bytes - bytes / 10;  // the estimate's own error
+}
+
+/// All vertices and stored voxels of a level.
+void add_to_hull(const LevelView& level, SlabHull& hull) {
+  for (const vec3& position : level.positions) hull.add(position);
+  const float voxel_size = level.header.resolution;
+  const ivec3 dims = level.header.brick_dims;
+  for (size_t cell = 0; cell < level.brick_table.size(); ++cell) {
+    if (level.brick_table[cell] == kNoBrick) continue;
+    const int at = static_cast<int>(cell);
+    const ivec3 brick_at(at % dims.x, at / dims.x % dims.y, at / dims.x / dims.y);
+    ivec3 lower(kBrickSide), upper(0);
+    const Brick& brick = level.bricks[level.brick_table[cell]];
+    for (int i = 0; i < kBrickVoxels; ++i) {
+      if (brick.density[static_cast<size_t>(i)] == 0) continue;
+      const ivec3 voxel(i % kBrickSide, i / kBrickSide % kBrickSide, i / (kBrickSide * kBrickSide));
+      lower = glm::min(lower, voxel);
+      upper = glm::max(upper, voxel + 1);
+    }
+    const vec3 corner = level.header.volume_origin + vec3(brick_at * kBrickSide) * voxel_size;
+    hull.add(Box3{corner + vec3(lower) * voxel_size, corner + vec3(upper) * voxel_size});
+  }
+}
+
+/// One bake, step by step.
+class Baker {
+ public:
+  Baker(const BakeOptions& options, Surface source, BakeWorkspace workspace, BakeReport report)
+      : options_(options), workspace_(std::move(workspace)), report_(std::move(report)), surface_(std::move(source)) {}
+
+  Result<BakeReport> run() {
+    const Box3 bounds = surface_.bounds();
+    const double longest_side = max_component(bounds.size());
+    const double finest_resolution = longest_side / options_.finest_grid;
+    report_.manifest.origin = surface_.origin;
+    report_.manifest.base_resolution = finest_resolution / 2;
+    lattice_origin_ = 0.5 * (dvec3(bounds.lower) + dvec3(bounds.upper));
+    last_level_ =
+        options_.source_only ? 0 : static_cast<uint32_t>(std::bit_width(options_.finest_grid / options_.coarsest_grid));
+
+    if (auto done = bake_source(); !done) return tl::unexpected<Error>(done.error());
+    for (uint32_t level = 1; level <= last_level_; ++level) {
+      if (auto done = bake_level(level, std::ldexp(finest_resolution, static_cast<int>(level) - 1)); !done) {
+        return tl::unexpected<Error>(done.error());
+      }
+    }
+    report_.manifest.hull = hull_.corners();
+    for (const vec3& corner : report_.manifest.hull) report_.manifest.bounds.extend(corner);
+    if (auto done = write_manifest(workspace_.asset_dir(), report_.manifest); !done) {
+      return tl::unexpected<Error>(done.error());
+    }
+    if (auto done = workspace_.publish(); !done) return tl::unexpected<Error>(done.error());
+    report_progress("done", 1);
+    return std::move(report_);
+  }
+
+ private:
+  /// Level 0: the source as it is.
+  Result<void> bake_source() {
+    report_progress("level 0: write", 0);
+    LevelReport level_report;
+    level_report.grid = 2 * options_.finest_grid;
+    const Stopwatch watch;
+    const SurfaceOrder order = order_surface(surface_);
+    surface_ = reorder(surface_, order);
+    from_stored_ = identity_maps(surface_);
+    auto done = store_level(pack_level(0, report_.manifest.base_resolution, surface_, order, {}, {}), level_report);
+    level_report.write_seconds = watch.seconds();
+    report_.levels.push_back(level_report);
+    return done;
+  }
+
+  Result<void> bake_level(uint32_t level, double resolution) {
+    LevelReport level_report;
+    level_report.level = level;
+    level_report.grid = options_.finest_grid >> (level - 1);
+
+    const SurfaceOrder order = simplify_surface(level, resolution, level_report);
+    if (is_cancelled()) return cancelled();
+
+    auto volume = voxelize_rest(level, resolution, level_report);
+    if (!volume) return tl::unexpected<Error>(volume.error());
+
+    report_progress(fmt::format("level {}: write", level), share_done(level, 0.98));
+    const Stopwatch watch;
+    Result<void> done;
+    if (!level_report.worthless) {
+      done =
+          store_level(pack_level(level, resolution, surface_, order, std::move(*volume), from_stored_), level_report);
+    }
+    level_report.write_seconds = watch.seconds();
+    report_.levels.push_back(level_report);
+    return done;
+  }
+
+  /// Steps A and S: what is no longer surface at this resolution leaves surface_, the rest is simplified.
+  SurfaceOrder simplify_surface(uint32_t level, double resolution, LevelReport& level_report) {
+    report_progress(fmt::format("level {}: analyse", level), share_done(level, 0));
+    const Stopwatch analysis;
+    const auto is_macrosurface = classify_macrosurface(surface_, static_cast<float>(resolution));
+    const SplitSurface parts = split(surface_, is_macrosurface, sub_resolution_);
+    level_report.macrosurface_triangles = parts.macrosurface.triangles.size();
+    level_report.voxelized_triangles = sub_resolution_.triangles.size();
+    level_report.analysis_seconds = analysis.seconds();
+    if (is_cancelled()) return {};
+
+    report_progress(fmt::format("level {}: simplify", level), share_done(level, 0.03));
+    const Stopwatch simplification;
+    const SimplifyResult simplified = simplify(parts.macrosurface, {.resolution = static_cast<float>(resolution)});
+    SurfaceOrder order = order_surface(simplified.surface);
+    surface_ = reorder(simplified.surface, order);
+    compose(from_stored_.vertex, simplified.vertex_map);
+    compose(from_stored_.vertex, order.vertex_number);
+    compose(from_stored_.face, parts.macro_face);
+    compose(from_stored_.face, simplified.face_map);
+    compose(from_stored_.face, order.face_number);
+    level_report.simplify_seconds = simplification.seconds();
+    return order;
+  }
+
+  /// Step V, or its result from an interrupted bake.
+  Result<LevelData> voxelize_rest(uint32_t level, double resolution, LevelReport& level_report) {
+    const std::string stage = fmt::format("level {}: voxelise", level);
+    report_progress(stage, share_done(level, 0.05));
+    const Stopwatch watch;
+    const VoxelLattice lattice{lattice_origin_, resolution};
+    const VoxelizeOptions voxelize_options{
+        .rays_per_voxel = options_.rays_per_voxel,
+        .seed = level,
+        .cancel = options_.cancel,
+        .progress = [&](double done) { report_progress(stage, share_done(level, 0.05 + 0.92 * done)); }};
+    const uint64_t key = volume_key(sub_resolution_, lattice, voxelize_options);
+    if (auto stored = workspace_.load_volume(key)) {
+      level_report.resumed = true;
+      return std::move(*stored);
+    }
+    if (level != last_level_) {  // the root is always wanted
+      const auto size = estimate_volume(sub_resolution_, lattice, voxelize_options);
+      if (!size) return tl::unexpected<Error>(size.error());
+      if (least_bytes(*size, sub_resolution_, surface_) > most_bytes_worth_writing(level)) {
+        level_report.worthless = true;
+        level_report.triangles = surface_.triangles.size();
+        level_report.voxelize_seconds = watch.seconds();
+        return LevelData{};
+      }
+    }
+    const auto volume = voxelize(sub_resolution_, lattice, voxelize_options);
+    if (!volume) return tl::unexpected<Error>(volume.error());
+    LevelData packed = pack_volume(*volume);
+    if (packed.has_volume()) {
+      if (const auto stored = workspace_.store_volume(key, packed); !stored) {
+        report_.warnings.push_back("an interrupted bake could not be resumed: " + stored.error().message);
+      }
+    }
+    level_report.voxelize_seconds = watch.seconds();
+    return packed;
+  }
+
+  /// Writes a level if it is worth its bytes, and notes it in the manifest.
+  Result<void> store_level(const LevelData& level, LevelReport& level_report) {
+    const uint32_t number = level.header.level;
+    level_report.triangles = face_count(level);
+    level_report.voxels = voxel_count(level);
+    if (is_cancelled()) return cancelled();
+    if (!level.has_surface() && !level.has_volume()) return {};  // too thin for any ray to have hit it
+
+    const LevelView view = view_of(level);
+    const auto cost = options_.measure_resident ? options_.measure_resident(view) : measure_level_scene(view);
+    if (!cost) return tl::unexpected<Error>(cost.error());
+    if (cost->resident_bytes > most_bytes_worth_writing(number)) return {};
+    level_report.is_written = true;
+
+    LevelEntry entry;
+    entry.level = number;
+    entry.resolution = std::ldexp(report_.manifest.base_resolution, static_cast<int>(number));
+    entry.grid = level_report.grid;
+    entry.file = fmt::format("level_{}.ffl", number);
+    entry.triangles = face_count(level);
+    entry.voxels = voxel_count(level);
+    entry.bricks = level.bricks.size();
+    entry.resident_bytes = cost->resident_bytes;
+    entry.build_peak_bytes = cost->build_peak_bytes;
+    const fs::path path = workspace_.asset_dir() / entry.file;
+    const auto bytes = write_level(path, level);
+    if (!bytes) return tl::unexpected<Error>(bytes.error());
+    entry.file_bytes = *bytes;
+    const auto hash = hash_level_file(path);
+    if (!hash) return tl::unexpected<Error>(hash.error());
+    entry.file_hash = *hash;
+    report_.manifest.levels.push_back(entry);
+
+    add_to_hull(view, hull_);
+    from_stored_ = identity_maps(surface_);
+    return {};
+  }
+
+  /// The source is always written. A coarser level must save a tenth against the last one written; for the root, which
+  /// stays resident, any saving will do.
+  uint64_t most_bytes_worth_writing(uint32_t level) const {
+    if (report_.manifest.levels.empty()) return std::numeric_limits<uint64_t>::max();
+    const uint64_t before = report_.manifest.levels.back().resident_bytes;
+    return level == last_level_ ? before - std::min<uint64_t>(before, 1) : before - before / 10;
+  }
+
+  bool is_cancelled() const { return options_.cancel && options_.cancel->load(std::memory_order_relaxed); }
+  static tl::unexpected<Error> cancelled() { return make_error(ErrorCode::Cancelled, "bake: cancelled"); }
+
+  /// How much of the whole bake is done when `part` of a level is: levels are weighted by about the rays they cast.
+  double share_done(uint32_t level, double part) const {
+    const auto weight = [](uint32_t k) { return std::max(std::pow(0.2, k - 1), 0.01); };
+    double before = 0, all = 0;
+    for (uint32_t k = 1; k <= last_level_; ++k) {
+      all += weight(k);
+      if (k < level) before += weight(k);
+    }
+    constexpr double kSource = 0.05;  // import and level 0
+    return kSource + (1 - kSource) * (before + part * weight(level)) / all;
+  }
+
+  void report_progress(const std::string& stage, double done) const {
+    if (options_.progress) options_.progress(stage, done);
+  }
+
+  const BakeOptions& options_;
+  BakeWorkspace workspace_;
+  BakeReport report_;
+  Surface surface_;         ///< of the level at hand, in final order
+  Surface sub_resolution_;  ///< all that has left the surface so far
+  MorphMaps from_stored_;   ///< from the last written level to surface_
+  SlabHull hull_;
+  dvec3 lattice_origin_{0.0};
+  uint32_t last_level_ = 0;
+};
+
+}  // namespace
+
+Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeOptions& options) {
+  if (auto checked = check_options(options); !checked) return tl::unexpected<Error>(checked.error());
+  // What is no asset cannot be up to date: refused before the import, which may take minutes. An asset with other
+  // files in it may be; then they do no harm.
+  if (auto checked = check_replaceable(out); !checked && !read_manifest(out)) {
+    return tl::unexpected<Error>(checked.error());
+  }
+  const Stopwatch watch;
+  if (options.progress) options.progress("import", 0);
+  auto asset = import_asset(source, options.import);
+  if (!asset) return tl::unexpected<Error>(asset.error());
+  const double import_seconds = watch.seconds();
+  auto report = bake(std::move(*asset), source.filename().string(), out, options);
+  if (report) {
+    report->import_seconds = import_seconds;
+    report->total_seconds += import_seconds;
+  }
+  return report;
+}
+
+Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, const fs::path& out,
+                        const BakeOptions& options) {
+  if (auto checked = check_options(options); !checked) return tl::unexpected<Error>(checked.error());
+  const Stopwatch watch;
+  BakeReport report;
+  report.warnings = std::move(asset.warnings);
+  report.manifest.generator = "farfield " FARFIELD_VERSION;
+  report.manifest.source = source_name;
+  report.manifest.source_hash = asset.source_hash;
+  report.manifest.options = canonical_options(options);
+  if (auto manifest = find_up_to_date(out, report.manifest)) {
+    report.manifest = std::move(*manifest);
+    report.up_to_date = true;
+    report.total_seconds = watch.seconds();
+    return report;
+  }
+  auto workspace = BakeWorkspace::open(out);
+  if (!workspace) return tl::unexpected<Error>(workspace.error());
+  auto baked = Baker(options, std::move(asset.surface), std::move(*workspace), std::move(report)).run();
+  if (baked) baked->total_seconds = watch.seconds();
+  return baked;
+}
+
+}  // namespace farfield

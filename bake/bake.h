@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// The bake: a source becomes a folder of levels (thesis 6.4 and chapters 7-10).
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "cache/level.h"
+#include "cache/manifest.h"
+#include "prefilter/condition.h"
+
+namespace farfield {
+
+struct BakeOptions {
+  uint32_t finest_grid = 512;     ///< level 1: longest side of the bounds / r_1. A power of two >= coarsest_grid
+  uint32_t coarsest_grid = 8;     ///< last level, the root
+  uint32_t rays_per_voxel = 200;  ///< thesis 10.1.3
+  bool source_only = false;       ///< write only level 0 (what --full-detail renders)
+  ImportOptions import;
+
+  /// What a level costs a host. Empty: measured by loading it as the runtime would (measure_level_scene).
+  std::function<Result<LevelCost>(const LevelView&)> measure_resident;
+  /// Called from the baking thread with the stage's name ("level 3: voxelise") and how much of the whole is done, in
+  /// [0, 1].
+  std::function<void(const std::string& stage, double done)> progress;
+  /// Polled often; when it becomes true the bake stops with Cancelled and what is finished stays for the next run.
+  const std::atomic<bool>* cancel = nullptr;
+};
+
+/// One level's part of the report.
+struct LevelReport {
+  uint32_t level = 0;
+  uint32_t grid = 0;
+  uint64_t macrosurface_triangles = 0;  ///< of the previous level's surface that stayed surface, before simplification
+  uint64_t voxelized_triangles = 0;     ///< all sub-resolution geometry up to this level
+  uint64_t triangles = 0;               ///< after simplification
+  uint64_t voxels = 0;
+  double analysis_seconds = 0, simplify_seconds = 0, voxelize_seconds = 0, write_seconds = 0;
+  bool resumed = false;     ///< taken from an earlier, interrupted bake
+  bool is_written = false;  ///< false: it saves nothing over a finer level
+  bool worthless = false;   ///< so surely that it was not even voxelised; `voxels` is 0
+};
+
+struct BakeReport {
+  Manifest manifest;
+  std::vector<LevelReport> levels;
+  std::vector<std::string> warnings;
+  double import_seconds = 0, total_seconds = 0;
+  bool up_to_date = false;  ///< the folder already held exactly this bake; nothing was done
+};
+
+/// Bakes `source` into the folder `out` (created; conventionally NAME.farfield). Same source and options give the same
+/// bytes for any thread count. Interrupted bakes resume: finished levels are found by hash and kept; the manifest is
+/// written last. Errors: those of import_asset; InvalidArgument (options); Io (with nothing half-written under a final
+/// name); Cancelled.
+Result<BakeReport> bake(const std::filesystem::path& source, const std::filesystem::path& out,
+                        const BakeOptions& options);
+
+/// The same for an asset in memory; source_name goes into the manifest. options.import only names what was asked for.
+Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, const std::filesystem::path& out,
+                        const BakeOptions& options);
+
+}  // namespace farfield

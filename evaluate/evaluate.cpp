@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/evaluate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "bake/bake.h"
+#include "base/hash.h"
+#include "cache/level_file.h"
+#include "evaluate/sheet.h"
+#include "evaluate/views.h"
+#include "path_tracer/asset_view.h"
+#include "path_tracer/environment.h"
+#include "path_tracer/temporary_file.h"
+
+namespace farfield {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr int kParts = 4;  // two renders of two half-buffers each: what metrics.h needs to tell noise from error
+
+/// What will be rendered for one level.
+struct LevelPlan {
+  LevelEntry entry;
+  std::vector<OrthoView> views;
+  uint64_t pixels = 0;  ///< over all views
+  int samples_per_pixel = 0;
+
+  double cost() const { return static_cast<double>(pixels) * samples_per_pixel; }
+};
+
+/// One picture of one view, in independent parts.
+using Parts = std::vector<Image>;
+
+Box3 in_source_space(const Box3& bounds, const Manifest& manifest) {
+  return {bounds.lower + vec3(manifest.origin), bounds.upper + vec3(manifest.origin)};
+}
+
+/// What the level's pictures have to show: the level and its source. (The bounds of the whole asset are those of its
+/// root, which may be voxels wider.)
+Result<Box3> bounds_of(const EvaluateOptions& options, const Manifest& manifest, const LevelEntry& entry) {
+  const auto file = LevelFile::open(options.asset / entry.file, LevelCheck::Structure);
+  if (!file) return tl::unexpected(file.error());
+  return in_source_space((*file)->view().header.bounds, manifest);
+}
+
+Result<std::vector<LevelPlan>> plan_evaluation(const Manifest& manifest, const Box3& source_bounds,
+                                               const EvaluateOptions& options) {
+  constexpr uint64_t kMaxPicture = uint64_t{1} << 26;
+  std::vector<LevelPlan> plans;
+  for (const LevelEntry& entry : manifest.levels) {
+    if (entry.level < options.first_level || entry.level > options.last_level) continue;
+    auto bounds = bounds_of(options, manifest, entry);
+    if (!bounds) return tl::unexpected(bounds.error());
+    bounds->extend(source_bounds);
+    LevelPlan plan{entry, {}, 0, 0};
+    for (const vec3& direction : view_directions(options.views)) {
+      const OrthoView view = frame_view(*bounds, direction, static_cast<float>(entry.resolution));
+      const uint64_t pixels = static_cast<uint64_t>(view.width_px) * static_cast<uint64_t>(view.height_px);
+      if (pixels > kMaxPicture)
+        return make_error(ErrorCode::InvalidArgument,
+                          fmt::format("{}: level {} needs pictures of {} x {} pixels; evaluate coarser levels only",
+                                      options.asset.string(), entry.level, view.width_px, view.height_px));
+      plan.views.push_back(view);
+      plan.pixels += pixels;
+    }
+    plan.samples_per_pixel = options.samples_per_pixel > 0 ? (options.samples_per_pixel + kParts - 1) / kParts * kParts
+                                                           : default_samples_per_pixel(plan.pixels);
+    plans.push_back(std::move(plan));
+  }
+  if (plans.empty())
+    return make_error(ErrorCode::InvalidArgument,
+                      fmt::format("{}: has no level between {} and {}; `farfield info` lists them",
+                                  options.asset.string(), options.first_level, options.last_level));
+  return plans;
+}
+
+/// Imports the source anew into an asset of level 0 only, which the path tracer then renders like any other.
+Result<Manifest> bake_source(const EvaluateOptions& options, const fs::path& folder) {
+  BakeOptions bake_options;
+  bake_options.source_only = true;
+  bake_options.import = options.import;
+  bake_options.cancel = options.cancel;
+  if (options.progress)
+    bake_options.progress = [&](const std::string&, double) { options.progress("importing the source", 0.0); };
+  auto report = bake(options.source, folder, bake_options);
+  if (!report) return tl::unexpected(report.error());
+  return std::move(report->manifest);
+}
+
+Result<Parts> render_parts(const AssetView& asset, const OrthoView& view, int samples_per_pixel, uint64_t seed,
+                           const Lights& lights, const std::atomic<bool>* cancel) {
+  ViewOptions options;
+  options.center = view.center;
+  options.direction = view.direction;
+  options.up = view.up;
+  options.width_world = view.width();
+  options.width = view.width_px;
+  options.height = view.height_px;
+  options.trace.samples_per_pixel = samples_per_pixel / 2;
+  Parts parts;
+  for (uint64_t render = 0; render < kParts / 2; ++render) {
+    options.trace.seed = mix64(seed, render);
+    auto images = asset.render(options, lights, cancel);
+    if (!images) return tl::unexpected(images.error());
+    for (Image& half : images->half) parts.push_back(std::move(half));
+  }
+  return parts;
+}
+
+/// The light, as another renderer needs it.
+Metadata light_metadata(const SunSkyOptions& light, const Environment& environment) {
+  const vec3 sun_direction = glm::normalize(light.sun_direction);
+  return {{"farfield:sun_direction", sun_direction},
+          {"farfield:sun_radiance", environment.radiance(sun_direction)},
+          {"farfield:sun_irradiance", light.sun_irradiance},
+          {"farfield:sun_angle_rad", light.sun_angle_rad},
+          {"farfield:sky_model", std::string("Preetham 1999, +y up, see environment.exr")},
+          {"farfield:sky_turbidity", light.turbidity},
+          {"farfield:ground_albedo", light.ground_albedo}};
+}
+
+Metadata view_metadata(Metadata metadata, const LevelPlan& plan, const OrthoView& view) {
+  metadata["farfield:level"] = static_cast<int>(plan.entry.level);
+  metadata["farfield:resolution"] = static_cast<float>(plan.entry.resolution);
+  metadata["farfield:samples_per_pixel"] = plan.samples_per_pixel;
+  metadata["farfield:camera_direction"] = view.direction;
+  metadata["farfield:camera_up"] = view.up;
+  metadata["farfield:camera_center"] = view.center;
+  metadata["farfield:orthographic_width"] = view.width();
+  return metadata;
+}
+
+/// The environment as a latitude-longitude picture (layout: Environment::from_image), sun disc included: every texel is
+/// a mean, so that it holds the disc's light although it is smaller than a texel.
+Image environment_image(const Environment& environment) {
+  constexpr int kWidth = 1024, kHeight = 512, kSubsamples = 8;
+  Image image(kWidth, kHeight, {"R", "G", "B"});
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) {
+      vec3 sum(0.0f);
+      for (int j = 0; j < kSubsamples; ++j)
+        for (int i = 0; i < kSubsamples; ++i) {
+          const float u = (static_cast<float>(x) + (static_cast<float>(i) + 0.5f) / kSubsamples) / kWidth;
+          const float v = (static_cast<float>(y) + (static_cast<float>(j) + 0.5f) / kSubsamples) / kHeight;
+          const float theta = v * kPi, phi = (u - 0.5f) * 2.0f * kPi;
+          sum += environment.radiance(
+              {std::sin(theta) * std::sin(phi), std::cos(theta), -std::sin(theta) * std::cos(phi)});
+        }
+      sum *= 1.0f / (kSubsamples * kSubsamples);
+      for (int c = 0; c < 3; ++c) image.pixel(x, y)[c] = sum[c];
+    }
+  return image;
+}
+
+Result<void> make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error)
+    return make_error(ErrorCode::Io, fmt::format("{}: cannot make this folder: {}", folder.string(), error.message()));
+  return {};
+}
+
+std::vector<std::string> captions(const LevelEvaluation& level) {
+  const ErrorMetrics& e = level.errors;
+  return {fmt::format("level {}  grid {}^3  {} triangles  {} voxels", level.entry.level, level.entry.grid,
+                      level.entry.triangles, level.entry.voxels),
+          fmt::format("occlusion {:+.2f}%  rms {:.2f}%  color {:.2f}%  bias {:+.2f}% {:+.2f}% {:+.2f}%",
+                      100 * e.occlusion_error.value, 100 * e.occlusion_rms.value, 100 * e.color_error.value,
+                      100 * e.color_bias[0].value, 100 * e.color_bias[1].value, 100 * e.color_bias[2].value)};
+}
+
+/// The state of one evaluation while it runs.
+class Evaluator {
+ public:
+  Evaluator(const EvaluateOptions& options, const AssetView& source)
+      : options_(options), source_(source), light_(default_sun_sky()) {
+    lights_.environment = Environment::sun_sky(light_);
+    light_metadata_ = light_metadata(light_, lights_.environment);
+  }
+
+  Result<Evaluation> run(const std::vector<LevelPlan>& plans) {
+    for (const LevelPlan& plan : plans) total_cost_ += plan.cost();
+    if (auto written = prepare_images(); !written) return tl::unexpected(written.error());
+    Evaluation evaluation;
+    evaluation.views = options_.views;
+    for (const LevelPlan& plan : plans) {
+      auto level = evaluate_level(plan);
+      if (!level) return tl::unexpected(level.error());
+      evaluation.levels.push_back(std::move(*level));
+    }
+    if (!options_.sheet.empty())
+      if (auto written = write_png(options_.sheet, make_sheet(rows_)); !written) return tl::unexpected(written.error());
+    return evaluation;
+  }
+
+ private:
+  Result<void> prepare_images() const {
+    if (options_.images.empty()) return {};
+    if (auto made = make_folder(options_.images); !made) return made;
+    return write_exr(options_.images / "environment.exr", environment_image(lights_.environment), light_metadata_);
+  }
+
+  Result<LevelEvaluation> evaluate_level(const LevelPlan& plan) {
+    const Clock::time_point start = Clock::now();
+    auto asset = AssetView::open(options_.asset, static_cast<float>(plan.entry.level));
+    if (!asset) return tl::unexpected(asset.error());
+    ErrorAccumulator accumulator;
+    for (size_t i = 0; i < plan.views.size(); ++i) {
+      if (options_.progress)
+        options_.progress(fmt::format("level {}, view {}/{}", plan.entry.level, i + 1, plan.views.size()),
+                          done_cost_ / total_cost_);
+      if (auto done = evaluate_view(plan, i, **asset, accumulator); !done) return tl::unexpected(done.error());
+      done_cost_ += plan.cost() / static_cast<double>(plan.views.size());
+    }
+    LevelEvaluation level{plan.entry, accumulator.metrics(), plan.samples_per_pixel, plan.pixels, 0};
+    level.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    if (!options_.sheet.empty()) rows_.back().captions = captions(level);
+    return level;
+  }
+
+  Result<void> evaluate_view(const LevelPlan& plan, size_t index, const AssetView& asset,
+                             ErrorAccumulator& accumulator) {
+    const OrthoView& view = plan.views[index];
+    const uint64_t seed = mix64(mix64(options_.seed, plan.entry.level), 2 * index);
+    auto source = render_parts(source_, view, plan.samples_per_pixel, seed, lights_, options_.cancel);
+    if (!source) return tl::unexpected(source.error());
+    auto level = render_parts(asset, view, plan.samples_per_pixel, seed + 1, lights_, options_.cancel);
+    if (!level) return tl::unexpected(level.error());
+    if (auto added = accumulator.add_view(*source, *level); !added) return added;
+
+    const bool in_sheet = !options_.sheet.empty() && index == 0;
+    if (!in_sheet && options_.images.empty()) return {};
+    Image source_image = mean_image(*source), level_image = mean_image(*level);
+    if (auto written = write_images(plan, index, source_image, level_image); !written) return written;
+    if (in_sheet) rows_.push_back({std::move(source_image), std::move(level_image), {}});
+    return {};
+  }
+
+  Result<void> write_images(const LevelPlan& plan, size_t index, const Image& source, const Image& level) const {
+    if (options_.images.empty()) return {};
+    const Metadata metadata = view_metadata(light_metadata_, plan, plan.views[index]);
+    const std::string name = fmt::format("level_{:02}_view_{:02}_", plan.entry.level, index);
+    if (auto written = write_exr(options_.images / (name + "source.exr"), source, metadata); !written) return written;
+    return write_exr(options_.images / (name + "level.exr"), level, metadata);
+  }
+
+  const EvaluateOptions& options_;
+  const AssetView& source_;
+  SunSkyOptions light_;
+  Lights lights_;
+  Metadata light_metadata_;
+  std::vector<SheetRow> rows_;
+  double total_cost_ = 0, done_cost_ = 0;
+};
+
+/// Puts the errors into the asset's manifest, where `farfield info` finds them.
+Result<void> record_errors(const fs::path& asset, const std::vector<LevelEvaluation>& levels) {
+  auto manifest = read_manifest(asset);
+  if (!manifest) return tl::unexpected(manifest.error());
+  for (const LevelEvaluation& level : levels)
+    for (LevelEntry& entry : manifest->levels)
+      if (entry.level == level.entry.level)
+        entry.errors = LevelErrors{level.errors.occlusion_error.value, level.errors.occlusion_rms.value,
+                                   level.errors.color_error.value};
+  return write_manifest(asset, *manifest);
+}
+
+}  // namespace
+
+int default_samples_per_pixel(uint64_t pixels) {
+  constexpr uint64_t kSamples = 16'000'000;  // per picture and level: docs/error_metric.md has the times
+  const uint64_t samples = kSamples / std::max<uint64_t>(pixels, 1);
+  return static_cast<int>(std::clamp<uint64_t>(samples / kParts * kParts, 8, 4096));
+}
+
+Result<Evaluation> evaluate(const EvaluateOptions& options) {
+  if (options.views < 1 || options.samples_per_pixel < 0)
+    return make_error(ErrorCode::InvalidArgument, "evaluate needs at least one view and one sample per pixel");
+  auto manifest = read_manifest(options.asset);
+  if (!manifest) return tl::unexpected(manifest.error());
+  auto folder = TemporaryFolder::create();
+  if (!folder) return tl::unexpected(folder.error());
+  auto source_manifest = bake_source(options, folder->path());
+  if (!source_manifest) return tl::unexpected(source_manifest.error());
+
+  auto plans = plan_evaluation(*manifest, in_source_space(source_manifest->bounds, *source_manifest), options);
+  if (!plans) return tl::unexpected(plans.error());
+  auto source = AssetView::open(folder->path(), 0.0f);
+  if (!source) return tl::unexpected(source.error());
+
+  auto evaluation = Evaluator(options, **source).run(*plans);
+  if (!evaluation) return evaluation;
+  if (source_manifest->source_hash != manifest->source_hash) {
+    evaluation->warnings.push_back(
+        fmt::format("{}: was baked from a file that differs from {}; the errors are not recorded in the asset",
+                    options.asset.string(), options.source.string()));
+    return evaluation;
+  }
+  if (auto recorded = record_errors(options.asset, evaluation->levels); !recorded)
+    evaluation->warnings.push_back(fmt::format("errors are not recorded in the asset: {}", recorded.error().message));
+  return evaluation;
+}
+
+std::string to_json(const Evaluation& evaluation) {
+  using Json = nlohmann::ordered_json;
+  Json levels = Json::array();
+  for (const LevelEvaluation& level : evaluation.levels) {
+    const ErrorMetrics& e = level.errors;
+    levels.push_back({
+        {"level", level.entry.level},
+        {"grid", level.entry.grid},
+        {"resolution", level.entry.resolution},
+        {"occlusion_error", e.occlusion_error.value},
+        {"occlusion_rms", e.occlusion_rms.value},
+        {"color_error", e.color_error.value},
+        {"color_bias", {e.color_bias[0].value, e.color_bias[1].value, e.color_bias[2].value}},
+        {"color_rest", e.color_rest.value},
+        {"triangles", level.entry.triangles},
+        {"voxels", level.entry.voxels},
+        {"bytes_disk", level.entry.file_bytes},
+        {"bytes_resident", level.entry.resident_bytes},
+        {"color_error_raw", e.color_error_raw},
+        {"color_error_low", e.color_error_low},
+        {"color_noise", e.color_noise},
+        {"occlusion_rms_raw", e.occlusion_rms_raw},
+        {"standard_errors",
+         {{"occlusion_error", e.occlusion_error.standard_error},
+          {"occlusion_rms", e.occlusion_rms.standard_error},
+          {"color_error", e.color_error.standard_error},
+          {"color_bias",
+           {e.color_bias[0].standard_error, e.color_bias[1].standard_error, e.color_bias[2].standard_error}},
+          {"color_rest", e.color_rest.standard_error}}},
+        {"samples_per_pixel", level.samples_per_pixel},
+        {"pixels", level.pixels},
+        {"seconds", level.seconds},
+    });
+  }
+  const Json json = {{"views", evaluation.views}, {"warnings", evaluation.warnings}, {"levels", levels}};
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace farfield

@@ -1,0 +1,449 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "import/gltf_scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <set>
+
+#include "import/gltf_document.h"
+#include "import/read_file.h"
+
+namespace farfield {
+namespace {
+
+using glm::dmat4;
+using glm::dvec4;
+
+// ---- animation
+
+/// The key interval that a time falls into: keys [index, index + 1] and how far between them, in [0, 1].
+struct Interval {
+  size_t index;
+  double t;
+  double seconds;  ///< length of the interval
+};
+
+Interval find_interval(const std::vector<float>& times, double seconds) {
+  if (!(seconds > times.front())) return {0, 0.0, 0.0};  // also for NaN
+  if (seconds >= times.back()) return {times.size() - 1, 0.0, 0.0};
+  const auto above = std::upper_bound(times.begin(), times.end(), seconds,
+                                      [](double s, float key) { return s < static_cast<double>(key); });
+  const size_t index = static_cast<size_t>(above - times.begin()) - 1;
+  const double begin = times[index], length = static_cast<double>(times[index + 1]) - begin;
+  return {index, (seconds - begin) / length, length};
+}
+
+dvec4 slerp(dvec4 a, dvec4 b, double t) {
+  double cosine = glm::dot(a, b);
+  if (cosine < 0) {  // the short way round
+    b = -b;
+    cosine = -cosine;
+  }
+  if (cosine > 0.9999995) return glm::normalize(glm::mix(a, b, t));  // sin would lose its digits
+  const double angle = std::acos(cosine);
+  return (std::sin((1 - t) * angle) * a + std::sin(t * angle) * b) / std::sin(angle);
+}
+
+/// The value of a channel at a time (glTF 2.0, appendix C). Rotations come out as unit quaternions.
+dvec4 sample(const GltfChannel& channel, double seconds) {
+  const Interval at = find_interval(channel.times, seconds);
+  const auto value = [&](size_t i) { return dvec4(channel.values[i]); };
+  const bool is_rotation = channel.path == GltfChannel::Path::Rotation;
+  dvec4 result;
+  if (channel.interpolation == GltfChannel::Interpolation::CubicSpline) {
+    if (at.t == 0.0) {
+      result = value(3 * at.index + 1);
+    } else {
+      const double t = at.t, t2 = t * t, t3 = t2 * t;
+      result = (2 * t3 - 3 * t2 + 1) * value(3 * at.index + 1) +
+               at.seconds * (t3 - 2 * t2 + t) * value(3 * at.index + 2) + (3 * t2 - 2 * t3) * value(3 * at.index + 4) +
+               at.seconds * (t3 - t2) * value(3 * at.index + 3);
+    }
+  } else if (channel.interpolation == GltfChannel::Interpolation::Step || at.t == 0.0) {
+    result = value(at.index);
+  } else if (is_rotation) {
+    result = slerp(value(at.index), value(at.index + 1), at.t);
+  } else {
+    result = glm::mix(value(at.index), value(at.index + 1), at.t);
+  }
+  if (!is_rotation) return result;
+  const double length = glm::length(result);
+  return length > 0 ? result / length : dvec4(0, 0, 0, 1);
+}
+
+dmat4 local_matrix(const GltfScene& scene, const GltfNode& node, double seconds) {
+  NodeTransform transform{node.translation, node.scale, node.rotation, node.matrix, node.has_matrix};
+  for (const uint32_t index : node.channels) {
+    const GltfChannel& channel = scene.channels[index];
+    const dvec4 value = sample(channel, seconds);
+    switch (channel.path) {
+      case GltfChannel::Path::Translation:
+        transform.translation = dvec3(value);
+        break;
+      case GltfChannel::Path::Rotation:
+        transform.rotation = value;
+        break;
+      case GltfChannel::Path::Scale:
+        transform.scale = dvec3(value);
+        break;
+    }
+  }
+  return to_matrix(transform);
+}
+
+std::vector<dmat4> world_matrices(const GltfScene& scene, double seconds) {
+  std::vector<dmat4> world;
+  world.reserve(scene.nodes.size());
+  for (const GltfNode& node : scene.nodes) {
+    const dmat4 local = local_matrix(scene, node, seconds);
+    world.push_back(node.parent < 0 ? local : world[static_cast<size_t>(node.parent)] * local);
+  }
+  return world;
+}
+
+dmat4 world_matrix(const GltfScene& scene, uint32_t node, double seconds) {
+  dmat4 world(1.0);
+  for (int32_t n = static_cast<int32_t>(node); n >= 0; n = scene.nodes[static_cast<size_t>(n)].parent) {
+    world = local_matrix(scene, scene.nodes[static_cast<size_t>(n)], seconds) * world;
+  }
+  return world;
+}
+
+mat4x3 to_affine(const dmat4& m) { return mat4x3(vec3(m[0]), vec3(m[1]), vec3(m[2]), vec3(m[3])); }
+
+/// Puts a camera where its node is. Scales, mirrors and shears are taken out: forward stays, up is made upright to it.
+void place(GltfCamera& camera, const dmat4& world) {
+  camera.position = vec3(world[3]);
+  const dvec3 forward = -dvec3(world[2]), up(world[1]);
+  if (glm::length(glm::cross(forward, up)) <= 1e-12 * glm::length(forward) * glm::length(up)) return;
+  camera.forward = vec3(glm::normalize(forward));
+  camera.right = vec3(glm::normalize(glm::cross(forward, up)));
+  camera.up = glm::cross(camera.right, camera.forward);
+}
+
+// ---- reading
+
+class SceneReader {
+ public:
+  explicit SceneReader(const GltfDocument& document) : document_(document), model_(document.model) {}
+
+  Result<GltfScene> read() {
+    scene_.warnings = document_.warnings;
+    for (size_t m = 0; m < model_.meshes.size(); ++m) {
+      auto done = read_mesh(m);
+      if (!done) return tl::unexpected(done.error());
+    }
+    const std::vector<int> order = scene_nodes(document_);
+    flatten_nodes(order);
+    for (const auto& animation : model_.animations) {
+      auto done = read_animation(animation);
+      if (!done) return tl::unexpected(done.error());
+    }
+    find_time_range();
+    place_everything(order);
+    return std::move(scene_);
+  }
+
+ private:
+  void warn(std::string text) { scene_.warnings.push_back(std::move(text)); }
+
+  Result<void> read_mesh(size_t index) {
+    const auto& source = model_.meshes[index];
+    GltfMesh mesh;
+    mesh.name = source.name;
+    mesh.asset_name = unique_name(source.name, index);
+    for (const auto& primitive : source.primitives) {
+      const auto position = primitive.attributes.find("POSITION");
+      if (position == primitive.attributes.end()) continue;
+      const int counted = primitive.indices >= 0 ? primitive.indices : position->second;
+      const uint64_t count = model_.accessors[static_cast<size_t>(counted)].count;
+      const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
+      if (mode < TINYGLTF_MODE_TRIANGLES) continue;  // points and lines
+      mesh.triangle_count += mode == TINYGLTF_MODE_TRIANGLES ? count / 3 : std::max<uint64_t>(count, 2) - 2;
+      auto box = position_bounds(position->second);
+      if (!box) return tl::unexpected(box.error());
+      mesh.bounds.extend(*box);
+    }
+    scene_.meshes.push_back(std::move(mesh));
+    return {};
+  }
+
+  /// From the accessor's min and max where they are usable (quantised ones are not in mesh units), else from its
+  /// values.
+  Result<Box3> position_bounds(int index) {
+    const auto& accessor = model_.accessors[static_cast<size_t>(index)];
+    Box3 box;
+    if (!accessor.normalized && accessor.minValues.size() == 3 && accessor.maxValues.size() == 3) {
+      for (int c = 0; c < 3; ++c) {
+        box.lower[c] = static_cast<float>(accessor.minValues[static_cast<size_t>(c)]);
+        box.upper[c] = static_cast<float>(accessor.maxValues[static_cast<size_t>(c)]);
+      }
+      if (is_finite(box.lower) && is_finite(box.upper)) return box;
+      box = Box3();
+    }
+    const auto values = read_accessor(document_, index, 3);
+    if (!values) return tl::unexpected(values.error());
+    for (size_t i = 0; i + 2 < values->size(); i += 3) {
+      const vec3 point((*values)[i], (*values)[i + 1], (*values)[i + 2]);
+      if (is_finite(point)) box.extend(point);
+    }
+    return box;
+  }
+
+  std::string unique_name(const std::string& name, size_t index) {
+    std::string clean = name.substr(0, 100);
+    for (char& c : clean) {
+      const bool is_plain = std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' || c == '.';
+      if (!is_plain || static_cast<unsigned char>(c) > 127) c = '_';
+    }
+    if (clean.empty()) clean = fmt::format("mesh_{}", index);
+    if (clean[0] == '.') clean[0] = '_';
+    std::string unique = clean;
+    for (int n = 2; !taken_names_.insert(lower_case(unique)).second; ++n) unique = fmt::format("{}_{}", clean, n);
+    return unique;
+  }
+
+  /// Some file systems do not tell upper from lower case.
+  static std::string lower_case(std::string text) {
+    for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return text;
+  }
+
+  void flatten_nodes(const std::vector<int>& order) {
+    scene_index_.assign(model_.nodes.size(), -1);
+    const std::vector<int> parent = parents(model_);
+    for (const int n : order) {
+      const NodeTransform transform = transform_of(model_.nodes[static_cast<size_t>(n)]);
+      GltfNode node;
+      const int up = parent[static_cast<size_t>(n)];
+      node.parent = up < 0 ? -1 : scene_index_[static_cast<size_t>(up)];
+      node.translation = transform.translation;
+      node.scale = transform.scale;
+      node.rotation = transform.rotation;
+      node.matrix = transform.matrix;
+      node.has_matrix = transform.has_matrix;
+      scene_index_[static_cast<size_t>(n)] = static_cast<int32_t>(scene_.nodes.size());
+      scene_.nodes.push_back(std::move(node));
+    }
+  }
+
+  Result<void> read_animation(const tinygltf::Animation& animation) {
+    for (const auto& source : animation.channels) {
+      const bool has_node = source.target_node >= 0 && source.target_node < static_cast<int>(model_.nodes.size());
+      if (source.target_node >= 0 && !has_node)
+        return document_.bad(fmt::format("animation {}: no such node", animation.name));
+      if (!has_node || scene_index_[static_cast<size_t>(source.target_node)] < 0) continue;  // not in this scene
+      auto done = read_channel(animation, source);
+      if (!done) return done;
+    }
+    return {};
+  }
+
+  Result<void> read_channel(const tinygltf::Animation& animation, const tinygltf::AnimationChannel& source) {
+    const auto place = fmt::format("animation {} of node {}", animation.name, source.target_node);
+    GltfChannel channel{};
+    if (source.target_path == "translation")
+      channel.path = GltfChannel::Path::Translation;
+    else if (source.target_path == "rotation")
+      channel.path = GltfChannel::Path::Rotation;
+    else if (source.target_path == "scale")
+      channel.path = GltfChannel::Path::Scale;
+    else
+      return warn(fmt::format("{}: {} is not animated", place, source.target_path)), Result<void>();
+
+    GltfNode& node = scene_.nodes[static_cast<size_t>(scene_index_[static_cast<size_t>(source.target_node)])];
+    const bool is_taken = std::any_of(node.channels.begin(), node.channels.end(),
+                                      [&](uint32_t c) { return scene_.channels[c].path == channel.path; });
+    if (is_taken || node.has_matrix) {
+      warn(fmt::format("{}: {}; ignored", place,
+                       is_taken ? "a second animation of the same property" : "the node has a matrix"));
+      return {};
+    }
+    if (source.sampler < 0 || source.sampler >= static_cast<int>(animation.samplers.size())) {
+      return document_.bad(place + ": no such sampler");
+    }
+    const auto& sampler = animation.samplers[static_cast<size_t>(source.sampler)];
+    channel.interpolation = sampler.interpolation == "STEP"          ? GltfChannel::Interpolation::Step
+                            : sampler.interpolation == "CUBICSPLINE" ? GltfChannel::Interpolation::CubicSpline
+                                                                     : GltfChannel::Interpolation::Linear;
+    auto done = read_keys(sampler, place, channel);
+    if (!done) return done;
+    node.channels.push_back(static_cast<uint32_t>(scene_.channels.size()));
+    scene_.channels.push_back(std::move(channel));
+    return {};
+  }
+
+  Result<void> read_keys(const tinygltf::AnimationSampler& sampler, const std::string& place, GltfChannel& channel) {
+    const int accessor_count = static_cast<int>(model_.accessors.size());
+    if (sampler.input < 0 || sampler.input >= accessor_count || sampler.output < 0 ||
+        sampler.output >= accessor_count) {
+      return document_.bad(place + ": no such accessor");
+    }
+    const int components = channel.path == GltfChannel::Path::Rotation ? 4 : 3;
+    const auto times = read_accessor(document_, sampler.input, 1);
+    if (!times) return tl::unexpected(times.error());
+    const auto values = read_accessor(document_, sampler.output, components);
+    if (!values) return tl::unexpected(values.error());
+
+    const size_t per_key = channel.interpolation == GltfChannel::Interpolation::CubicSpline ? 3 : 1;
+    if (times->empty() || values->size() != times->size() * per_key * static_cast<size_t>(components)) {
+      return document_.bad(fmt::format("{}: {} keys, but values for another number", place, times->size()));
+    }
+    channel.times.assign(times->begin(), times->end());
+    for (size_t i = 0; i < channel.times.size(); ++i) {
+      const bool is_good = std::isfinite(channel.times[i]) && (i == 0 || channel.times[i] > channel.times[i - 1]);
+      if (!is_good) return document_.bad(fmt::format("{}: key times do not increase at key {}", place, i));
+    }
+    for (size_t i = 0; i < values->size(); i += static_cast<size_t>(components)) {
+      vec4 value(0.0f);
+      for (int c = 0; c < components; ++c) {
+        value[c] = static_cast<float>((*values)[i + static_cast<size_t>(c)]);
+        if (!std::isfinite(value[c])) return document_.bad(place + ": a key is not finite");
+      }
+      channel.values.push_back(value);
+    }
+    return {};
+  }
+
+  void find_time_range() {
+    if (scene_.channels.empty()) return;
+    double start = INFINITY, end = -INFINITY, spacing = INFINITY;
+    for (const GltfChannel& channel : scene_.channels) {
+      start = std::min(start, static_cast<double>(channel.times.front()));
+      end = std::max(end, static_cast<double>(channel.times.back()));
+      for (size_t i = 1; i < channel.times.size(); ++i) {
+        spacing = std::min(spacing, static_cast<double>(channel.times[i]) - channel.times[i - 1]);
+      }
+    }
+    scene_.start_seconds = start;
+    scene_.end_seconds = end;
+    for (const double rate : {24.0, 25.0, 30.0, 48.0, 50.0, 60.0}) {
+      if (std::abs(spacing * rate - 1) < 0.01) scene_.frames_per_second = rate;
+    }
+  }
+
+  void place_everything(const std::vector<int>& order) {
+    const std::vector<dmat4> world = world_matrices(scene_, 0);
+    for (uint32_t i = 0; i < order.size(); ++i) {
+      const auto& node = model_.nodes[static_cast<size_t>(order[i])];
+      if (node.mesh >= 0) {
+        if (is_invertible(world[i])) {
+          scene_.instances.push_back({static_cast<uint32_t>(node.mesh), to_affine(world[i]), node.name, i});
+        } else {
+          warn(fmt::format("node {} ({}): its transform is singular; left out", order[i], node.name));
+        }
+      }
+      if (node.camera >= 0) add_camera(node, i, world[i]);
+      const auto light = node.extensions.find("KHR_lights_punctual");
+      if (light != node.extensions.end()) add_light(node, light->second, i, world[i]);
+    }
+  }
+
+  void add_camera(const tinygltf::Node& node, uint32_t index, const dmat4& world) {
+    const auto& source = model_.cameras[static_cast<size_t>(node.camera)];
+    GltfCamera camera;
+    camera.name = node.name.empty() ? source.name : node.name;
+    camera.node = index;
+    camera.is_orthographic = source.type == "orthographic";
+    if (camera.is_orthographic) {
+      camera.half_width = static_cast<float>(source.orthographic.xmag);
+      camera.half_height = static_cast<float>(source.orthographic.ymag);
+      camera.z_near = static_cast<float>(source.orthographic.znear);
+    } else {
+      camera.yfov_rad = static_cast<float>(source.perspective.yfov);
+      camera.aspect = static_cast<float>(source.perspective.aspectRatio);
+      camera.z_near = static_cast<float>(source.perspective.znear);
+    }
+    const bool is_good = camera.is_orthographic ? std::isnormal(camera.half_width) && std::isnormal(camera.half_height)
+                                                : camera.yfov_rad > 0 && camera.yfov_rad < kPi;
+    if (!is_good || !is_invertible(world)) {
+      warn(fmt::format("camera {}: its angle, size or transform is not usable; left out", camera.name));
+      return;
+    }
+    camera.half_width = std::abs(camera.half_width);
+    camera.half_height = std::abs(camera.half_height);
+    if (!(camera.aspect > 0) || !std::isfinite(camera.aspect)) camera.aspect = 0;
+    if (!(camera.z_near > 0) || !std::isfinite(camera.z_near)) camera.z_near = 0;
+    place(camera, world);
+    scene_.cameras.push_back(std::move(camera));
+  }
+
+  void add_light(const tinygltf::Node& node, const tinygltf::Value& extension, uint32_t index, const dmat4& world) {
+    const auto number = extension_number(extension, "light");
+    if (!number || *number < 0 || *number >= static_cast<double>(model_.lights.size()) || !is_invertible(world)) {
+      warn(fmt::format("light of node {}: no such light, or a singular transform; left out", node.name));
+      return;
+    }
+    const auto& source = model_.lights[static_cast<size_t>(*number)];
+    GltfLight light;
+    light.type = source.type == "point"  ? GltfLight::Type::Point
+                 : source.type == "spot" ? GltfLight::Type::Spot
+                                         : GltfLight::Type::Directional;
+    light.name = node.name.empty() ? source.name : node.name;
+    if (source.color.size() == 3) light.color = vec3(source.color[0], source.color[1], source.color[2]);
+    light.intensity = static_cast<float>(source.intensity);
+    light.position = vec3(world[3]);
+    light.direction = vec3(glm::normalize(-dvec3(world[2])));
+    light.inner_cone_rad = static_cast<float>(source.spot.innerConeAngle);
+    light.outer_cone_rad = static_cast<float>(source.spot.outerConeAngle);
+    light.node = index;
+    if (!is_finite(light.color) || !std::isfinite(light.intensity) || min_component(light.color) < 0 ||
+        light.intensity < 0) {
+      warn(fmt::format("light {}: colour or intensity is not usable; left out", light.name));
+      return;
+    }
+    scene_.lights.push_back(std::move(light));
+  }
+
+  const GltfDocument& document_;
+  const tinygltf::Model& model_;
+  GltfScene scene_;
+  std::vector<int32_t> scene_index_;  ///< of each node of the file, or -1 when it is not in the scene
+  std::set<std::string> taken_names_;
+};
+
+}  // namespace
+
+GltfCamera GltfScene::camera_at(size_t index, double seconds) const {
+  GltfCamera camera = cameras[index];
+  place(camera, world_matrix(*this, camera.node, seconds));
+  return camera;
+}
+
+std::vector<GltfInstance> GltfScene::instances_at(double seconds) const {
+  const std::vector<dmat4> world = world_matrices(*this, seconds);
+  std::vector<GltfInstance> placed;
+  for (const GltfInstance& instance : instances) {
+    if (!is_invertible(world[instance.node])) continue;
+    placed.push_back(instance);
+    placed.back().to_world = to_affine(world[instance.node]);
+  }
+  return placed;
+}
+
+Box3 GltfScene::bounds_world() const {
+  Box3 box;
+  for (const GltfInstance& instance : instances) {
+    const Box3& local = meshes[instance.mesh].bounds;
+    if (local.is_empty()) continue;
+    for (int corner = 0; corner < 8; ++corner) {
+      const vec3 p((corner & 1 ? local.upper : local.lower).x, (corner & 2 ? local.upper : local.lower).y,
+                   (corner & 4 ? local.upper : local.lower).z);
+      box.extend(instance.to_world * vec4(p, 1));
+    }
+  }
+  return box;
+}
+
+Result<GltfScene> read_gltf_scene(const std::filesystem::path& path) {
+  const auto bytes = read_file(path);
+  if (!bytes) return tl::unexpected(bytes.error());
+  const auto document = open_gltf(*bytes, path);
+  if (!document) return tl::unexpected(document.error());
+  return SceneReader(*document).read();
+}
+
+}  // namespace farfield

@@ -1,0 +1,428 @@
+// SPDX-License-Identifier: Apache-2.0
+// Meshes of glTF files, with their materials in the terms of SourceMaterial.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <map>
+
+#include "base/hash.h"
+#include "import/gltf_document.h"
+#include "import/read_formats.h"
+
+namespace farfield {
+namespace {
+
+using tinygltf::Model;
+using tinygltf::Value;
+
+// Flattening multiplies: a small file with many nodes could ask for any number of triangles.
+constexpr uint64_t kMaxTriangles = 100'000'000;
+
+const Value* extension(const tinygltf::ExtensionMap& extensions, const char* name) {
+  const auto found = extensions.find(name);
+  return found == extensions.end() ? nullptr : &found->second;
+}
+
+float unit(double value) { return std::isfinite(value) ? static_cast<float>(std::clamp(value, 0.0, 1.0)) : 0.0f; }
+
+Wrap to_wrap(int mode) {
+  return mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? Wrap::Clamp
+         : mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::Mirror
+                                                         : Wrap::Repeat;
+}
+
+/// Which coordinates a texture uses and what happens to them first (KHR_texture_transform).
+struct UvSource {
+  int set = 0;
+  glm::dvec2 offset{0.0}, scale{1.0};
+  double rotation_rad = 0;
+
+  friend bool operator==(const UvSource&, const UvSource&) = default;
+
+  vec2 apply(double u, double v) const {
+    const double c = std::cos(rotation_rad), s = std::sin(rotation_rad);
+    const double x = u * scale.x, y = v * scale.y;
+    return vec2(glm::dvec2(c * x + s * y, -s * x + c * y) + offset);
+  }
+};
+
+UvSource uv_source(int texcoord, const tinygltf::ExtensionMap& extensions) {
+  UvSource out;
+  out.set = std::clamp(texcoord, 0, 99);
+  const Value* transform = extension(extensions, "KHR_texture_transform");
+  if (!transform || !transform->IsObject()) return out;
+  const auto pair = [&](const char* key, glm::dvec2& value) {
+    if (!transform->Has(key) || transform->Get(key).ArrayLen() != 2) return;
+    for (int c = 0; c < 2; ++c) {
+      const Value& number = transform->Get(key).Get(c);
+      if (number.IsNumber() && std::isfinite(number.GetNumberAsDouble())) value[c] = number.GetNumberAsDouble();
+    }
+  };
+  pair("offset", out.offset);
+  pair("scale", out.scale);
+  out.rotation_rad = extension_number(*transform, "rotation").value_or(0);
+  if (const auto set = extension_number(*transform, "texCoord"))
+    out.set = static_cast<int>(std::clamp(*set, 0.0, 99.0));
+  return out;
+}
+
+/// Materials of the file, converted when a primitive first uses them.
+class MaterialReader {
+ public:
+  MaterialReader(const GltfDocument& document, SourceMesh& mesh) : document_(document), mesh_(mesh) {}
+
+  /// Index into mesh.materials. material -1: none.
+  uint32_t find(int material) {
+    const auto [found, is_new] = index_.try_emplace(material, static_cast<uint32_t>(mesh_.materials.size()));
+    if (is_new) {
+      mesh_.materials.emplace_back();
+      uv_.emplace_back();
+      if (material >= 0) convert(material, found->second);
+    }
+    return found->second;
+  }
+  const UvSource& uv(uint32_t index) const { return uv_[index]; }
+
+ private:
+  void warn(std::string text) { mesh_.warnings.push_back(std::move(text)); }
+
+  void convert(int index, uint32_t target) {
+    const auto& source = document_.model.materials[static_cast<size_t>(index)];
+    const auto& pbr = source.pbrMetallicRoughness;
+    SourceMaterial out;
+    out.base_color = vec3(1.0f);
+    if (pbr.baseColorFactor.size() == 4) {
+      for (int c = 0; c < 3; ++c) out.base_color[c] = unit(pbr.baseColorFactor[static_cast<size_t>(c)]);
+      out.alpha = unit(pbr.baseColorFactor[3]);
+    }
+    out.metallic = unit(pbr.metallicFactor);
+    out.roughness = unit(pbr.roughnessFactor);
+    set_alpha_mode(source, out);
+    set_specular(source, out);
+    set_transmission(source, out);
+    set_textures(source, out, uv_[target]);
+    const auto& e = source.emissiveFactor;
+    if (std::any_of(e.begin(), e.end(), [](double v) { return v > 0; })) {
+      warn(fmt::format("material {}: emission is ignored", source.name));
+    }
+    mesh_.materials[target] = std::move(out);
+  }
+
+  void set_alpha_mode(const tinygltf::Material& source, SourceMaterial& out) {
+    if (source.alphaMode == "MASK") {
+      out.is_masked = true;
+      out.alpha_cutoff = std::isfinite(source.alphaCutoff) ? static_cast<float>(source.alphaCutoff) : 0.5f;
+    } else if (source.alphaMode == "BLEND") {
+      out.is_masked = true;
+      warn(fmt::format("material {}: alpha blending is cut at 0.5, there is no partial transparency", source.name));
+    }
+  }
+
+  /// F0 of the dielectric part: ((ior - 1) / (ior + 1))^2, 0.04 by default, times KHR_materials_specular.
+  void set_specular(const tinygltf::Material& source, SourceMaterial& out) {
+    double ior = 1.5;
+    if (const Value* e = extension(source.extensions, "KHR_materials_ior"))
+      ior = extension_number(*e, "ior").value_or(ior);
+    // ior 0 is the extension's way to say "reflects everything"
+    const double f0 = ior == 0 ? 1.0 : std::pow((ior - 1) / (ior + 1), 2.0);
+    out.dielectric_f0 = vec3(unit(f0));
+    if (const Value* e = extension(source.extensions, "KHR_materials_specular")) {
+      const vec3 color = extension_vec3(*e, "specularColorFactor").value_or(vec3(1.0f));
+      const float factor = unit(extension_number(*e, "specularFactor").value_or(1.0));
+      out.dielectric_f0 = glm::clamp(out.dielectric_f0 * color, vec3(0.0f), vec3(1.0f)) * factor;
+      if (e->Has("specularTexture") || e->Has("specularColorTexture")) {
+        warn(fmt::format("material {}: specular textures are ignored", source.name));
+      }
+    }
+    if (extension(source.extensions, "KHR_materials_unlit")) {
+      out.dielectric_f0 = vec3(0.0f);
+      out.metallic = 0;
+      warn(fmt::format("material {}: unlit is shown as diffuse", source.name));
+    }
+  }
+
+  void set_transmission(const tinygltf::Material& source, SourceMaterial& out) {
+    for (const char* ignored : {"KHR_materials_transmission", "KHR_materials_clearcoat", "KHR_materials_sheen",
+                                "KHR_materials_anisotropy", "KHR_materials_pbrSpecularGlossiness"}) {
+      if (extension(source.extensions, ignored)) warn(fmt::format("material {}: {} is ignored", source.name, ignored));
+    }
+    const Value* e = extension(source.extensions, "KHR_materials_diffuse_transmission");
+    if (!e) return;
+    out.diffuse_transmission = unit(extension_number(*e, "diffuseTransmissionFactor").value_or(0.0));
+    const vec3 color = extension_vec3(*e, "diffuseTransmissionColorFactor").value_or(vec3(1.0f));
+    out.diffuse_transmission_color = glm::clamp(color, vec3(0.0f), vec3(1.0f));
+    if (e->Has("diffuseTransmissionTexture") || e->Has("diffuseTransmissionColorTexture")) {
+      warn(fmt::format("material {}: diffuse transmission textures are ignored", source.name));
+    }
+  }
+
+  void set_textures(const tinygltf::Material& source, SourceMaterial& out, UvSource& uv) {
+    const auto& pbr = source.pbrMetallicRoughness;
+    const auto& color = pbr.baseColorTexture;
+    const auto& rough = pbr.metallicRoughnessTexture;
+    if (color.index >= 0) {
+      uv = uv_source(color.texCoord, color.extensions);
+      out.base_color_map = texture(color.index, out.is_masked ? TextureUse::ColorWithAlpha : TextureUse::Color);
+    }
+    if (rough.index < 0) return;
+    const UvSource rough_uv = uv_source(rough.texCoord, rough.extensions);
+    out.metallic_roughness_map = texture(rough.index, TextureUse::Data);
+    if (!out.metallic_roughness_map) return;
+    if (!out.base_color_map) {
+      uv = rough_uv;
+    } else if (!(uv == rough_uv)) {
+      // One set of coordinates per corner is kept: this texture goes in by its mean.
+      const vec4 mean = out.metallic_roughness_map.image->mean();
+      out.roughness *= mean.y;
+      out.metallic *= mean.z;
+      out.metallic_roughness_map = {};
+      warn(fmt::format("material {}: roughness has texture coordinates of its own; its mean is used", source.name));
+    }
+  }
+
+  /// Null, with a warning, when the image cannot be had: the factors then stand alone.
+  SourceTexture texture(int index, TextureUse use) {
+    const auto& source = document_.model.textures[static_cast<size_t>(index)];
+    SourceTexture out;
+    if (source.sampler >= 0) {
+      const auto& sampler = document_.model.samplers[static_cast<size_t>(source.sampler)];
+      out.wrap_u = to_wrap(sampler.wrapS);
+      out.wrap_v = to_wrap(sampler.wrapT);
+    }
+    if (source.source < 0) {
+      warn(fmt::format("texture {}: no image that this version reads; the plain colour is used", index));
+      return out;
+    }
+    const auto key = std::make_pair(source.source, use);
+    const auto found = images_.find(key);
+    if (found != images_.end()) {
+      out.image = found->second;
+      return out;
+    }
+    out.image = image(source.source, use);
+    images_.emplace(key, out.image);
+    return out;
+  }
+
+  std::shared_ptr<const Texture> image(int index, TextureUse use) {
+    const auto bytes = image_bytes(document_, index);
+    auto decoded = bytes ? decode_texture(*bytes, fmt::format("{}: image {}", document_.name, index), use)
+                         : tl::unexpected(bytes.error());
+    if (!decoded) {
+      warn(fmt::format("{}; the plain colour is used", decoded.error().message));
+      return nullptr;
+    }
+    return std::make_shared<const Texture>(std::move(*decoded));
+  }
+
+  const GltfDocument& document_;
+  SourceMesh& mesh_;
+  std::map<int, uint32_t> index_;
+  std::vector<UvSource> uv_;  ///< per material of the mesh
+  std::map<std::pair<int, TextureUse>, std::shared_ptr<const Texture>> images_;
+};
+
+/// The corner triples of a primitive, whatever its mode.
+std::vector<uvec3> to_triangles(const std::vector<uint32_t>& indices, int mode) {
+  std::vector<uvec3> out;
+  if (mode == TINYGLTF_MODE_TRIANGLES) {
+    for (size_t i = 0; i + 2 < indices.size(); i += 3) out.emplace_back(indices[i], indices[i + 1], indices[i + 2]);
+  } else {
+    for (size_t i = 0; i + 2 < indices.size(); ++i) {
+      const bool is_fan = mode == TINYGLTF_MODE_TRIANGLE_FAN;
+      const size_t swap = !is_fan && i % 2 == 1 ? 1 : 0;
+      out.emplace_back(is_fan ? indices[0] : indices[i], indices[i + 1 + swap], indices[i + 2 - swap]);
+    }
+  }
+  return out;
+}
+
+class GltfMeshReader {
+ public:
+  explicit GltfMeshReader(const GltfDocument& document)
+      : document_(document), model_(document.model), materials_(document, mesh_) {}
+
+  Result<SourceMesh> read(int mesh) {
+    mesh_.warnings = document_.warnings;
+    mesh_.dependency_hash = document_.dependency_hash;
+    auto done = mesh >= 0 ? read_one(mesh) : read_scene();
+    if (!done) return tl::unexpected(done.error());
+    if (!mesh_.corner_uv.empty()) mesh_.corner_uv.resize(mesh_.corner_count(), no_uv());
+    if (!mesh_.corner_color.empty()) mesh_.corner_color.resize(mesh_.corner_count(), vec4(1.0f));
+    return std::move(mesh_);
+  }
+
+ private:
+  static vec2 no_uv() { return vec2(std::numeric_limits<float>::quiet_NaN()); }
+
+  Result<void> read_one(int mesh) {
+    if (mesh >= static_cast<int>(model_.meshes.size())) {
+      return make_error(ErrorCode::InvalidArgument,
+                        fmt::format("{}: there is no mesh {}, only {}", document_.name, mesh, model_.meshes.size()));
+    }
+    return add_mesh(mesh, glm::dmat4(1.0));
+  }
+
+  Result<void> read_scene() {
+    if (model_.nodes.empty()) {  // a library of meshes
+      for (size_t m = 0; m < model_.meshes.size(); ++m) {
+        if (auto done = add_mesh(static_cast<int>(m), glm::dmat4(1.0)); !done) return done;
+      }
+      return {};
+    }
+    const std::vector<int> parent = parents(model_);
+    std::vector<glm::dmat4> world(model_.nodes.size(), glm::dmat4(1.0));
+    for (const int n : scene_nodes(document_)) {
+      const auto at = static_cast<size_t>(n);
+      const auto& node = model_.nodes[at];
+      world[at] = to_matrix(transform_of(node));
+      if (parent[at] >= 0) world[at] = world[static_cast<size_t>(parent[at])] * world[at];
+      if (node.mesh < 0) continue;
+      if (!is_invertible(world[at])) {
+        mesh_.warnings.push_back(fmt::format("node {} ({}): its transform is singular; left out", n, node.name));
+        continue;
+      }
+      // glTF 2.0, 3.7.3.3: a skinned mesh stands where its skeleton is, not where its node is.
+      if (node.skin >= 0)
+        mesh_.warnings.push_back(fmt::format("node {}: skinning is ignored, the mesh is taken as stored", n));
+      if (auto done = add_mesh(node.mesh, world[at]); !done) return done;
+    }
+    return {};
+  }
+
+  Result<void> add_mesh(int index, const glm::dmat4& to_world) {
+    const auto& mesh = model_.meshes[static_cast<size_t>(index)];
+    for (size_t p = 0; p < mesh.primitives.size(); ++p) {
+      const auto place = fmt::format("mesh {} primitive {}", index, p);
+      if (auto done = add_primitive(mesh.primitives[p], to_world, place); !done) return done;
+    }
+    if (std::any_of(mesh.weights.begin(), mesh.weights.end(), [](double w) { return w != 0; })) {
+      mesh_.warnings.push_back(fmt::format("mesh {}: morph targets are ignored", index));
+    }
+    return {};
+  }
+
+  /// The vertex of each corner, three per triangle. Errors: an index past the last vertex.
+  Result<std::vector<uvec3>> triangles_of(const tinygltf::Primitive& primitive, size_t vertex_count, int mode,
+                                          const std::string& place) {
+    std::vector<uint32_t> indices;
+    if (primitive.indices >= 0) {
+      auto read = read_indices(document_, primitive.indices);
+      if (!read) return tl::unexpected(read.error());
+      indices = std::move(*read);
+      for (const uint32_t index : indices) {
+        if (index >= vertex_count) {
+          return document_.bad(fmt::format("{}: vertex index {}, there are {} vertices", place, index, vertex_count));
+        }
+      }
+    } else {
+      indices.resize(vertex_count);
+      for (size_t i = 0; i < vertex_count; ++i) indices[i] = static_cast<uint32_t>(i);
+    }
+    if (mode == TINYGLTF_MODE_TRIANGLES && indices.size() % 3 != 0) {
+      mesh_.warnings.push_back(fmt::format("{}: {} corners are no whole number of triangles", place, indices.size()));
+    }
+    return to_triangles(indices, mode);
+  }
+
+  Result<void> add_primitive(const tinygltf::Primitive& primitive, const glm::dmat4& to_world,
+                             const std::string& place) {
+    const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
+    const auto position = primitive.attributes.find("POSITION");
+    if (mode < TINYGLTF_MODE_TRIANGLES || position == primitive.attributes.end()) return {};  // points and lines
+    if (mode > TINYGLTF_MODE_TRIANGLE_FAN) return document_.bad(fmt::format("{}: unknown mode {}", place, mode));
+
+    const auto& accessor = model_.accessors[static_cast<size_t>(position->second)];
+    if (accessor.bufferView < 0 && !accessor.sparse.isSparse) {
+      return make_error(ErrorCode::Unsupported,
+                        fmt::format("{}: {}: positions are compressed (Draco or meshopt); export without compression",
+                                    document_.name, place));
+    }
+    const auto points = read_accessor(document_, position->second, 3);
+    if (!points) return tl::unexpected(points.error());
+    const size_t vertex_count = points->size() / 3;
+    const auto triangles = triangles_of(primitive, vertex_count, mode, place);
+    if (!triangles) return tl::unexpected(triangles.error());
+    if (mesh_.face_count() + triangles->size() > kMaxTriangles) {
+      return make_error(ErrorCode::Unsupported,
+                        fmt::format("{}: more than {} triangles with all instances; take its meshes one by one",
+                                    document_.name, kMaxTriangles));
+    }
+
+    const auto base = static_cast<uint32_t>(mesh_.positions.size());
+    for (size_t v = 0; v < vertex_count; ++v) {
+      const glm::dvec4 p((*points)[3 * v], (*points)[3 * v + 1], (*points)[3 * v + 2], 1);
+      mesh_.positions.emplace_back(to_world * p);
+    }
+    const uint32_t material = materials_.find(primitive.material);
+    const size_t first_corner = mesh_.corner_count();
+    for (const uvec3& t : *triangles) {
+      for (int k = 0; k < 3; ++k) mesh_.corner_position.push_back(base + t[k]);
+      mesh_.face_begin.push_back(static_cast<uint32_t>(mesh_.corner_count()));
+      mesh_.face_material.push_back(material);
+    }
+    if (auto done = add_uvs(primitive, *triangles, material, vertex_count, first_corner, place); !done) return done;
+    return add_colors(primitive, *triangles, vertex_count, first_corner, place);
+  }
+
+  Result<void> add_uvs(const tinygltf::Primitive& primitive, const std::vector<uvec3>& triangles, uint32_t material,
+                       size_t vertex_count, size_t first_corner, const std::string& place) {
+    const SourceMaterial& m = mesh_.materials[material];
+    if (!m.base_color_map && !m.metallic_roughness_map) return {};
+    const UvSource& source = materials_.uv(material);
+    const auto attribute = primitive.attributes.find(fmt::format("TEXCOORD_{}", source.set));
+    if (attribute == primitive.attributes.end()) {
+      mesh_.warnings.push_back(fmt::format("{}: textured, but without texture coordinates; the mean is used", place));
+      return {};
+    }
+    const auto values = read_accessor(document_, attribute->second, 2);
+    if (!values) return tl::unexpected(values.error());
+    if (values->size() / 2 < vertex_count) return document_.bad(place + ": fewer texture coordinates than vertices");
+    mesh_.corner_uv.resize(first_corner, no_uv());
+    for (const uvec3& t : triangles) {
+      for (int k = 0; k < 3; ++k) mesh_.corner_uv.push_back(source.apply((*values)[2 * t[k]], (*values)[2 * t[k] + 1]));
+    }
+    return {};
+  }
+
+  /// COLOR_0: linear, RGB or RGBA; multiplies the base colour.
+  Result<void> add_colors(const tinygltf::Primitive& primitive, const std::vector<uvec3>& triangles,
+                          size_t vertex_count, size_t first_corner, const std::string& place) {
+    const auto attribute = primitive.attributes.find("COLOR_0");
+    if (attribute == primitive.attributes.end()) return {};
+    const int components = component_count(document_, attribute->second);
+    if (components != 3 && components != 4) return document_.bad(place + ": COLOR_0 is neither RGB nor RGBA");
+    const auto values = read_accessor(document_, attribute->second, components);
+    if (!values) return tl::unexpected(values.error());
+    if (values->size() / static_cast<size_t>(components) < vertex_count) {
+      return document_.bad(place + ": fewer colours than vertices");
+    }
+    mesh_.corner_color.resize(first_corner, vec4(1.0f));
+    for (const uvec3& t : triangles) {
+      for (int k = 0; k < 3; ++k) {
+        vec4 color(1.0f);
+        for (int c = 0; c < components; ++c) {
+          color[c] = unit((*values)[static_cast<size_t>(components) * t[k] + static_cast<size_t>(c)]);
+        }
+        mesh_.corner_color.push_back(color);
+      }
+    }
+    return {};
+  }
+
+  const GltfDocument& document_;
+  const Model& model_;
+  SourceMesh mesh_;
+  MaterialReader materials_;
+};
+
+}  // namespace
+
+Result<SourceMesh> read_gltf(std::span<const unsigned char> bytes, const std::filesystem::path& path, int mesh) {
+  const auto document = open_gltf(bytes, path);
+  if (!document) return tl::unexpected(document.error());
+  return GltfMeshReader(*document).read(mesh);
+}
+
+}  // namespace farfield

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reading one model: OBJ + MTL, PLY, glTF / glb, each also gzipped, to polygons with corner attributes and materials.
+#pragma once
+
+#include <filesystem>
+
+#include "import/source_mesh.h"
+
+namespace farfield {
+
+struct ImportOptions {
+  int mesh =
+      -1;  ///< glTF only: import this mesh alone, in its own space; -1: all nodes of the default scene, flattened
+};
+
+/// Reads the file and those that it refers to. Content decides what a file is where it says so, its name otherwise.
+/// Positions may be infinite or NaN and polygons degenerate, as the file has them; all indices are in range. Errors:
+/// NotFound, Io, BadFile, Unsupported, InvalidArgument (no such mesh): one line that names the file, the place and the
+/// remedy. Never crashes on bad files.
+Result<SourceMesh> read_source(const std::filesystem::path& path, const ImportOptions& options = {});
+
+}  // namespace farfield

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where the baked assets of a scene lie, and baking those that are missing.
+//
+//   ASSETS/forest/small_maple.farfield          mesh "small_maple" of forest.glb
+//   ASSETS/forest/small_maple.source.farfield   its level 0 alone, for --full-detail
+//
+// ASSETS is --assets, or "farfield-assets" in the scene's own folder.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "base/result.h"
+#include "import/gltf_scene.h"
+#include "path_tracer/render_job.h"
+
+namespace farfield {
+
+/// The folder that holds the assets of options.scene: ASSETS/forest above.
+std::filesystem::path asset_library_folder(const RenderOptions& options);
+
+/// For each mesh of the scene the folder of its baked asset, up to date with the scene and the options; empty for
+/// meshes that no instance shows or that have no triangles. Bakes what is missing or stale, one mesh after the other,
+/// each in a process of its own (`farfield bake SCENE -o DIR --mesh N`), so that this one's memory stays what rendering
+/// needs. Errors: Io (the bake cannot be started), BadFile (it failed; it has said why on standard error), Cancelled.
+Result<std::vector<std::filesystem::path>> find_or_bake_assets(const GltfScene& scene, const RenderOptions& options);
+
+}  // namespace farfield

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "path_tracer/asset_view.h"
+
+#include "path_tracer/camera.h"
+#include "path_tracer/embree_handles.h"
+
+namespace farfield {
+
+struct AssetView::Impl {
+  DeviceHandle device;  // first: everything else lives on it
+  std::unique_ptr<Runtime> runtime;
+  SceneHandle scene;
+  AssetId asset{0};
+};
+
+AssetView::AssetView() : impl_(std::make_unique<Impl>()) {}
+AssetView::~AssetView() = default;
+
+Result<std::unique_ptr<AssetView>> AssetView::open(const std::filesystem::path& folder, float lambda,
+                                                   uint64_t budget_bytes) {
+  std::unique_ptr<AssetView> view(new AssetView);
+  Impl& impl = *view->impl_;
+  auto device = make_device();
+  if (!device) return tl::unexpected(device.error());
+  impl.device = std::move(*device);
+
+  RuntimeOptions options;
+  options.budget_bytes = budget_bytes;
+  options.forced_lambda = lambda;
+  auto runtime = Runtime::create(impl.device.get(), options);
+  if (!runtime) return tl::unexpected(runtime.error());
+  impl.runtime = std::move(*runtime);
+
+  const auto asset = impl.runtime->open_asset(folder.string());
+  if (!asset) return tl::unexpected(asset.error());
+  impl.asset = *asset;
+  if (auto instance = impl.runtime->add_instance(*asset, mat4x3(1.0f)); !instance)
+    return tl::unexpected(instance.error());
+  if (auto plan = impl.runtime->plan_frame(); !plan) return tl::unexpected(plan.error());
+
+  auto scene = make_scene(impl.device, *impl.runtime);
+  if (!scene) return tl::unexpected(scene.error());
+  impl.scene = std::move(*scene);
+  return view;
+}
+
+Box3 AssetView::bounds() const {
+  Box3 box;
+  impl_->runtime->bounds(impl_->asset, box.lower, box.upper);
+  return box;
+}
+
+const std::vector<LevelInfo>& AssetView::levels() const { return impl_->runtime->levels(impl_->asset); }
+
+Stats AssetView::stats() const { return impl_->runtime->stats(); }
+
+Result<ViewImages> AssetView::render(const ViewOptions& options, const Lights& lights,
+                                     const std::atomic<bool>* cancel) const {
+  // Rays start outside of the asset, however far from its middle the view's centre is.
+  const Box3 box = bounds();
+  const float distance = glm::length(box.size()) + glm::length(options.center - box.center());
+  const vec3 direction = glm::normalize(options.direction);
+  const Camera camera = Camera::orthographic(options.center - distance * direction, direction, options.up,
+                                             options.width_world, options.width, options.height);
+  TraceOptions trace = options.trace;
+  trace.transparent = true;
+  Film film(options.width, options.height, true);
+  const TraceScene scene{impl_->scene.get(), impl_->runtime.get(), &lights};
+  if (auto traced = path_trace(scene, camera, trace, film, {}, cancel); !traced) return tl::unexpected(traced.error());
+  return ViewImages{select_channels(film.image(), {"R", "G", "B", "A"}), {film.half(0), film.half(1)}};
+}
+
+}  // namespace farfield

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "path_tracer/frame_renderer.h"
+
+#include <fmt/format.h>
+#include <malloc.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "base/file_io.h"
+#include "base/hash.h"
+#include "path_tracer/asset_library.h"
+#include "path_tracer/film.h"
+#include "path_tracer/process_memory.h"
+#include "path_tracer/render_session.h"
+#include "path_tracer/scene_setup.h"
+#include "path_tracer/warm_up.h"
+
+namespace farfield {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kLargestSide = 1 << 15;
+constexpr uint64_t kMostManifestBytes = 16 << 20;
+
+// A file's name, size and time of change: enough to see that it is another one.
+std::string identity(const fs::path& path) {
+  if (path.empty()) return "none";
+  std::error_code ignored;
+  return fmt::format("{}:{}:{}", path.filename().string(), fs::file_size(path, ignored),
+                     fs::last_write_time(path, ignored).time_since_epoch().count());
+}
+
+// A manifest tells every byte of its asset apart, by hash.
+uint64_t manifest_hash(const fs::path& folder) {
+  const auto text = read_small_file(folder / "manifest.json", kMostManifestBytes);
+  return text ? hash_values(std::span<const char>(*text)) : 0;
+}
+
+std::string make_fingerprint(const RenderOptions& options, std::span<const fs::path> asset_folders) {
+  const TraceOptions& trace = options.trace;
+  std::string text = fmt::format(
+      "size {}x{} spp {} seed {} depth {} roulette {} clamp {} strategy {} transparent {} budget {} scale {} blend {} "
+      "full {} exposure {} scene {} environment {} assets",
+      options.width, options.height, trace.samples_per_pixel, trace.seed, trace.max_depth, trace.roulette_depth,
+      trace.clamp_indirect, static_cast<int>(trace.strategy), trace.transparent, options.budget_bytes,
+      options.lod_scale, static_cast<int>(options.blend), options.full_detail, options.exposure_stops,
+      identity(options.scene), identity(options.environment));
+  for (const fs::path& folder : asset_folders)
+    if (!folder.empty()) text += fmt::format(" {}:{}", folder.filename().string(), to_hex(manifest_hash(folder)));
+  return text;
+}
+
+Metadata frame_metadata(const RenderOptions& options, const Camera& camera, int frame) {
+  const TessellationCamera pixel = camera.tessellation();
+  return {
+      {"camera.forward", camera.forward()},
+      {"camera.pixel_spread", pixel.pixel_spread},
+      {"camera.pixel_width", pixel.pixel_width},
+      {"camera.position", camera.position()},
+      {"camera.up", camera.up()},
+      {"farfield.budget", fmt::format("{}", options.budget_bytes)},
+      {"farfield.frame", frame},
+      {"farfield.full_detail", options.full_detail ? 1 : 0},
+      {"farfield.lod_scale", options.lod_scale},
+      {"farfield.scene", options.scene.filename().string()},
+      {"farfield.seed", fmt::format("{}", options.trace.seed)},
+      {"farfield.spp", options.trace.samples_per_pixel},
+  };
+}
+
+bool same_places(std::span<const GltfInstance> a, std::span<const GltfInstance> b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const GltfInstance& x, const GltfInstance& y) {
+    return x.mesh == y.mesh && x.to_world == y.to_world;
+  });
+}
+
+void report_problems(const RenderOptions& options, const FrameReport& frame) {
+  if (!options.message) return;
+  if (frame.invalid_samples > 0)
+    options.message(
+        fmt::format("warning: frame {}: {} paths were not finite and are black", frame.frame, frame.invalid_samples));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOptions& options) {
+  if (options.width < 1 || options.height < 1 || options.width > kLargestSide || options.height > kLargestSide)
+    return make_error(ErrorCode::InvalidArgument, fmt::format("images of {} x {} pixels: 1 to {} each way",
+                                                              options.width, options.height, kLargestSide));
+  std::unique_ptr<FrameRenderer> renderer(new FrameRenderer);
+  renderer->options_ = options;
+
+  auto scene = read_gltf_scene(options.scene);
+  if (!scene) return tl::unexpected(scene.error());
+  std::vector<std::string> warnings = scene->warnings;
+  auto lights = make_lights(*scene, options, warnings);
+  if (!lights) return tl::unexpected(lights.error());
+  if (options.message)
+    for (const std::string& warning : warnings) options.message("warning: " + warning);
+
+  auto folders = find_or_bake_assets(*scene, options);
+  if (!folders) return tl::unexpected(folders.error());
+  for (size_t mesh = 0; mesh < folders->size(); ++mesh)
+    if (!(*folders)[mesh].empty()) renderer->asset_names_.push_back(scene->meshes[mesh].asset_name);
+  renderer->fingerprint_ = make_fingerprint(options, *folders);
+  renderer->scene_ = std::move(*scene);
+  renderer->lights_ = std::move(*lights);
+  renderer->asset_folders_ = std::move(*folders);
+  return renderer;
+}
+
+Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const FrameSink& sink) {
+  // Everything of ours first, assets last: see warm_up.h.
+  Film film(options_.width, options_.height);
+  auto device = make_device();
+  if (!device) return tl::unexpected(device.error());
+  if (auto warm = warm_up(*device, film.image()); !warm) return tl::unexpected(warm.error());
+
+  RenderReport report;
+  report.assets = asset_names_;
+  report.budget_bytes = options_.budget_bytes;
+  report.baseline_rss_bytes = resident_set_bytes();
+  const PeakMemory memory;
+
+  std::unique_ptr<RenderSession> session;
+  std::vector<GltfInstance> session_instances;
+  for (size_t i = 0; i < frames.size(); ++i) {
+    const double seconds = scene_.seconds_of_frame(frames[i]);
+    std::vector<GltfInstance> instances = scene_.instances_at(seconds);
+    if (!session || !same_places(instances, session_instances)) {
+      session.reset();  // before the next one, so that two never share the budget
+      auto opened = RenderSession::open(*device, options_, asset_folders_, instances);
+      if (!opened) return tl::unexpected(opened.error());
+      session = std::move(*opened);
+      session_instances = std::move(instances);
+    }
+
+    const Camera camera = make_camera(scene_, seconds, options_.width, options_.height);
+    const auto progress = [&](double done) {
+      if (!options_.progress) return;
+      options_.progress((static_cast<double>(i) + done) / static_cast<double>(frames.size()),
+                        fmt::format("frame {} ({}/{})", frames[i], i + 1, frames.size()));
+    };
+    auto frame = session->render(camera, lights_, options_, film, progress);
+    if (!frame) return tl::unexpected(frame.error());
+    frame->frame = frames[i];
+    report_problems(options_, *frame);
+    report.frames.push_back(std::move(*frame));
+    report.peak_accounted_bytes = std::max(report.peak_accounted_bytes, session->stats().peak_accounted_bytes);
+    report.peak_rss_bytes = memory.peak_bytes();
+    if (auto taken = sink(film.image(), frame_metadata(options_, camera, frames[i]), report); !taken)
+      return tl::unexpected(taken.error());
+  }
+  report.peak_rss_bytes = memory.peak_bytes();
+  return report;
+}
+
+}  // namespace farfield

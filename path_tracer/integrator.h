@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// A path tracer over Farfield geometry: the loop that a host would write.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "base/result.h"
+#include "farfield/runtime.h"
+#include "path_tracer/camera.h"
+#include "path_tracer/environment.h"
+#include "path_tracer/film.h"
+
+namespace farfield {
+
+/// A point or spot light (KHR_lights_punctual). Intensity in W / sr.
+struct PointLight {
+  vec3 position{0.0f};
+  vec3 intensity{0.0f};         ///< linear RGB
+  vec3 direction{0.0f, -1, 0};  ///< spot axis, unit
+  float cos_inner = -1;         ///< full intensity inside; -1 with cos_outer -1: all around
+  float cos_outer = -1;         ///< none outside
+};
+
+/// How much of its intensity a light sends into a unit direction that leaves it, in [0, 1].
+float spot_falloff(const PointLight& light, const vec3& direction);
+
+struct Lights {
+  Environment environment = Environment::constant(vec3(0.0f));
+  std::vector<PointLight> points;
+};
+
+/// What a path meets. `embree` is committed and holds the runtime's user geometry.
+struct TraceScene {
+  RTCScene embree = nullptr;
+  const Runtime* runtime = nullptr;
+  const Lights* lights = nullptr;
+};
+
+/// How direct light of the environment is found. All three converge to the same image.
+enum class LightStrategy : uint8_t {
+  Mis,           ///< both, weighted by the power heuristic [Veach 1997]
+  LightSamples,  ///< directions drawn from the lights only
+  ScatterRays,   ///< rays that scatter into a light only; point lights are still sampled
+};
+
+struct TraceOptions {
+  int samples_per_pixel = 16;
+  uint64_t seed = 0;
+  int max_depth = 64;        ///< scattering events per path; paths end earlier by Russian roulette, without bias
+  int roulette_depth = 4;    ///< first event after which Russian roulette may end the path
+  float clamp_indirect = 0;  ///< > 0: bounds each indirect contribution (biased, fewer fireflies); 0: unbiased
+  bool transparent = false;  ///< camera rays that miss give 0 instead of the environment
+  LightStrategy strategy = LightStrategy::Mis;
+};
+
+struct TraceStats {
+  uint64_t rays = 0;             ///< camera, scattered and shadow rays
+  uint64_t invalid_samples = 0;  ///< paths whose value was not finite; they count as black
+};
+
+/// Renders `camera` into `film` (same size) on all threads of parallel_for. The image depends on the arguments alone,
+/// not on threads or time. progress (may be empty) is called with the fraction done, in (0, 1], from several threads at
+/// once; cancel (may be null) is polled for each tile of 16 x 16 pixels. Errors: Cancelled (the film is part done);
+/// InvalidArgument (sizes differ, no samples).
+Result<TraceStats> path_trace(const TraceScene& scene, const Camera& camera, const TraceOptions& options, Film& film,
+                              const std::function<void(double done)>& progress = {},
+                              const std::atomic<bool>* cancel = nullptr);
+
+}  // namespace farfield

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// `farfield render`: one frame of a glTF scene.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "farfield/runtime.h"
+#include "path_tracer/integrator.h"
+
+namespace farfield {
+
+/// What render and shot have in common.
+struct RenderOptions {
+  std::filesystem::path scene;  ///< .gltf or .glb
+  int width = 480;
+  int height = 270;
+  TraceOptions trace;
+  uint64_t budget_bytes = uint64_t{4} << 30;
+  /// Folder of baked assets: ASSETS/SCENE/MESH.farfield for each mesh. Empty: "farfield-assets" beside the scene.
+  std::filesystem::path assets;
+  float lod_scale = 1.0f;
+  Blend blend = Blend::Dissolve;
+  bool full_detail = false;           ///< level 0 only, from assets baked with --source-only
+  std::filesystem::path environment;  ///< EXR; empty: sun and sky, the sun from the scene's directional light
+  float exposure_stops = 0;           ///< of the PNG previews
+  uint32_t finest_grid = 512;         ///< of assets that have to be baked first
+  /// Command that bakes: called as BAKER bake SCENE -o DIR --mesh N ... Empty: this very program.
+  std::filesystem::path baker;
+  /// Messages for a person, one line each, and how far the whole job is; from any thread. May be empty.
+  std::function<void(const std::string& line)> message;
+  std::function<void(double done, const std::string& what)> progress;
+  const std::atomic<bool>* cancel = nullptr;
+};
+
+/// What a frame took. Bytes are the process's and the budget's; see ShotReport.
+struct FrameReport {
+  int frame = 0;
+  double seconds = 0;            ///< wall time of plan, prefetch and render
+  double load_seconds = 0;       ///< of it, summed over loads of levels: map, check, build
+  uint64_t accounted_bytes = 0;  ///< that the runtime counts against the budget, after the frame
+  uint64_t rss_bytes = 0;        ///< of the process after the frame
+  uint64_t levels_loaded = 0;
+  uint64_t fallbacks = 0;  ///< rays served by a coarser level than planned
+  uint64_t rays = 0;
+  uint64_t invalid_samples = 0;        ///< paths whose value was not finite; black in the image
+  double bias = 0;                     ///< PlanSummary::bias
+  std::vector<uint32_t> finest_level;  ///< per asset of RenderReport::assets: finest level that rays may use
+};
+
+struct RenderReport {
+  std::vector<std::string> assets;  ///< names of the meshes that are shown
+  uint64_t budget_bytes = 0;
+  uint64_t baseline_rss_bytes = 0;    ///< of the process before it opened the assets
+  uint64_t peak_rss_bytes = 0;        ///< highest since then
+  uint64_t peak_accounted_bytes = 0;  ///< highest that the runtime counted against the budget
+  std::vector<FrameReport> frames;    ///< those that are finished, in order
+};
+
+/// Renders one frame to `out` (EXR with all AOVs and metadata) and to the PNG beside it.
+/// frame: n is the scene at n / 24 s (or at the frame rate of its animation, see GltfScene::frames_per_second). Errors:
+/// those of the scene, the bake, the runtime, the files; Cancelled.
+Result<RenderReport> render_frame(const RenderOptions& options, int frame, const std::filesystem::path& out);
+
+/// Writes an image to `exr` with its metadata, and as a PNG preview beside it. Errors: those of write_exr, write_png.
+Result<void> write_frame(const std::filesystem::path& exr, const Image& image, const Metadata& metadata,
+                         float exposure_stops);
+
+}  // namespace farfield

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// The runtime with a scene's assets and instances: opened once, rendered frame by frame.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "base/result.h"
+#include "import/gltf_scene.h"
+#include "path_tracer/embree_handles.h"
+#include "path_tracer/film.h"
+#include "path_tracer/render_job.h"
+
+namespace farfield {
+
+/// One thread at a time; render() itself uses all threads.
+class RenderSession {
+ public:
+  /// folders: per mesh, as find_or_bake_assets gives them; instances of meshes without one are left out. The device
+  /// outlives the session. Errors: those of Runtime.
+  static Result<std::unique_ptr<RenderSession>> open(const DeviceHandle& device, const RenderOptions& options,
+                                                     std::span<const std::filesystem::path> folders,
+                                                     std::span<const GltfInstance> instances);
+
+  /// Plans for the camera, loads, and renders into the film. `done` as in path_trace. The report's frame number is not
+  /// set. Errors: those of plan_frame and path_trace.
+  Result<FrameReport> render(const Camera& camera, const Lights& lights, const RenderOptions& options, Film& film,
+                             const std::function<void(double done)>& done);
+
+  Stats stats() const { return runtime_->stats(); }
+
+ private:
+  RenderSession() = default;
+  std::unique_ptr<Runtime> runtime_;
+  SceneHandle scene_;
+};
+
+}  // namespace farfield

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "path_tracer/scene_setup.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace farfield {
+
+namespace {
+
+Camera camera_around(const Box3& bounds, int width, int height) {
+  constexpr float kFovY = 0.7f;
+  const float radius = std::max(0.5f * glm::length(bounds.size()), 1e-6f);
+  const vec3 center = bounds.is_empty() ? vec3(0.0f) : bounds.center();
+  const vec3 forward = glm::normalize(vec3(-0.4f, -0.35f, -1.0f));
+  // The bounding sphere fits into the narrower of the two angles.
+  const float aspect = static_cast<float>(width) / static_cast<float>(height);
+  const float half_angle = std::atan(std::tan(0.5f * kFovY) * std::min(aspect, 1.0f));
+  return Camera::perspective(center - forward * (radius / std::sin(half_angle)), forward, vec3(0.0f, 1.0f, 0.0f), kFovY,
+                             width, height);
+}
+
+PointLight make_point_light(const GltfLight& light) {
+  PointLight point;
+  point.position = light.position;
+  point.intensity = light.color * (light.intensity / kLumensPerWatt);
+  if (light.type != GltfLight::Type::Spot) return point;
+  point.direction = light.direction;
+  point.cos_inner = std::cos(light.inner_cone_rad);
+  point.cos_outer = std::cos(light.outer_cone_rad);
+  return point;
+}
+
+float strength(const GltfLight& light) { return light.intensity * luminance(light.color); }
+
+}  // namespace
+
+Camera make_camera(const GltfScene& scene, double seconds, int width, int height) {
+  if (scene.cameras.empty()) return camera_around(scene.bounds_world(), width, height);
+  const GltfCamera camera = scene.camera_at(0, seconds);
+  if (!camera.is_orthographic)
+    return Camera::perspective(camera.position, camera.forward, camera.up, camera.yfov_rad, width, height);
+  const float width_world = 2 * camera.half_height * static_cast<float>(width) / static_cast<float>(height);
+  return Camera::orthographic(camera.position, camera.forward, camera.up, width_world, width, height);
+}
+
+Result<Lights> make_lights(const GltfScene& scene, const RenderOptions& options, std::vector<std::string>& warnings) {
+  Lights lights;
+  const GltfLight* sun = nullptr;
+  size_t directional_count = 0;
+  for (const GltfLight& light : scene.lights) {
+    if (light.type != GltfLight::Type::Directional) {
+      lights.points.push_back(make_point_light(light));
+      continue;
+    }
+    ++directional_count;
+    if (!sun || strength(light) > strength(*sun)) sun = &light;
+  }
+
+  if (!options.environment.empty()) {
+    auto environment = Environment::from_exr(options.environment);
+    if (!environment) return tl::unexpected(environment.error());
+    lights.environment = *environment;
+    if (sun) warnings.push_back("the environment image replaces the scene's directional lights");
+    return lights;
+  }
+  SunSkyOptions sky = default_sun_sky();
+  if (sun && strength(*sun) > 0) {
+    sky.sun_direction = -sun->direction;
+    sky.sun_irradiance = strength(*sun) / kLumensPerWatt;
+    sky.sun_color = sun->color;
+  }
+  if (directional_count > 1)
+    warnings.push_back(
+        fmt::format("{} directional lights: the brightest is the sun, the others are left out", directional_count));
+  lights.environment = Environment::sun_sky(sky);
+  return lights;
+}
+
+}  // namespace farfield

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a glTF scene to what the path tracer takes: camera, lights, instances.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "import/gltf_scene.h"
+#include "path_tracer/camera.h"
+#include "path_tracer/integrator.h"
+#include "path_tracer/render_job.h"
+
+namespace farfield {
+
+/// glTF's lights are photometric; one watt of ours is 683 lumens of theirs, as Blender's exporter has it.
+inline constexpr float kLumensPerWatt = 683.0f;
+
+/// The scene's first camera at a time, for images of width x height. It keeps its vertical angle (or extent), whatever
+/// the file's aspect ratio. A scene without a camera is seen whole, from above and in front.
+Camera make_camera(const GltfScene& scene, double seconds, int width, int height);
+
+/// Environment: options.environment, or sun and sky. The sun is the brightest directional light, in its direction,
+/// colour and strength; without one default_sun_sky(). Point and spot lights come as they are. What cannot be rendered
+/// (further directional lights, or all of them beside an environment image) adds a line to `warnings`. Errors: those of
+/// Environment::from_exr.
+Result<Lights> make_lights(const GltfScene& scene, const RenderOptions& options, std::vector<std::string>& warnings);
+
+}  // namespace farfield

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "path_tracer/shot_job.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <functional>
+#include <system_error>
+
+#include "base/file_io.h"
+#include "path_tracer/frame_renderer.h"
+#include "path_tracer/image.h"
+#include "path_tracer/shot_record.h"
+
+namespace farfield {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr uint64_t kMostRecordBytes = 256 << 20;
+constexpr int kSheetWidth = 1920;  ///< pixels, at most
+
+fs::path frame_path(const fs::path& folder, int frame) { return folder / fmt::format("frame_{:04}.exr", frame); }
+
+Result<void> write_record(const fs::path& path, const ShotRecord& record) {
+  const std::string text = to_json(record);
+  const std::span<const std::byte> piece = std::as_bytes(std::span(text));
+  return write_file_atomically(path, {&piece, 1});
+}
+
+bool in_range(const FrameRange& frames, int frame) {
+  return frame >= frames.first && frame <= frames.last && (frame - frames.first) % frames.step == 0;
+}
+
+// The report with some of its frames. If none is left, its memory figures are of nothing and go, too.
+RenderReport keep_frames(RenderReport report, const std::function<bool(int frame)>& is_kept) {
+  std::erase_if(report.frames, [&](const FrameReport& frame) { return !is_kept(frame.frame); });
+  return report.frames.empty() ? RenderReport() : report;
+}
+
+// What earlier runs of the same shot finished, whatever frames they were asked for. Empty if it was another shot.
+RenderReport finished_before(const fs::path& folder, const std::string& fingerprint) {
+  const auto text = read_small_file(folder / "shot.json", kMostRecordBytes);
+  const auto record = text ? shot_record_from_json(*text) : std::nullopt;
+  if (!record || record->fingerprint != fingerprint) return {};
+  return keep_frames(record->report, [&](int frame) {
+    std::error_code ignored;
+    return fs::exists(frame_path(folder, frame), ignored);
+  });
+}
+
+std::vector<int> frames_to_render(const FrameRange& frames, const RenderReport& finished) {
+  std::vector<int> missing;
+  for (int frame = frames.first; frame <= frames.last; frame += frames.step) {
+    const bool is_there = std::any_of(finished.frames.begin(), finished.frames.end(),
+                                      [&](const FrameReport& report) { return report.frame == frame; });
+    if (!is_there) missing.push_back(frame);
+  }
+  return missing;
+}
+
+// As square as whole rows allow, frames scaled down by a whole factor so that a row fits.
+ContactSheet make_sheet(const FrameRange& frames, int width, int height) {
+  const int columns = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(frames.count()))));
+  const int factor = std::max(1, (width * columns + kSheetWidth - 1) / kSheetWidth);
+  return ContactSheet(frames.count(), columns, (width + factor - 1) / factor, (height + factor - 1) / factor);
+}
+
+int sheet_cell(const FrameRange& frames, int frame) { return (frame - frames.first) / frames.step; }
+
+// Puts a finished frame on the sheet. False if it is damaged.
+bool read_into_sheet(ContactSheet& sheet, int cell, const fs::path& frame) {
+  const auto file = read_exr(frame);
+  if (file) sheet.set(cell, file->image);
+  return file.has_value();
+}
+
+}  // namespace
+
+Result<FrameRange> parse_frame_range(const std::string& text) {
+  FrameRange range;
+  const char* at = text.data();
+  const char* const end = text.data() + text.size();
+  const auto number = [&](int& value) {
+    const auto [next, error] = std::from_chars(at, end, value);
+    at = next;
+    return error == std::errc() && value >= 0;
+  };
+  const auto skip = [&](char c) { return at != end && *at == c && ++at; };
+
+  bool good = number(range.first);
+  range.last = range.first;
+  if (good && skip('-')) good = number(range.last);
+  if (good && skip(':')) good = number(range.step);
+  if (!good || at != end || range.last < range.first || range.step < 1 || range.last > (1 << 24))
+    return make_error(ErrorCode::InvalidArgument,
+                      fmt::format("\"{}\" is not a range of frames like 0-120, 0-120:10 or 60", text));
+  return range;
+}
+
+Result<RenderReport> render_shot(const RenderOptions& options, const FrameRange& frames, const fs::path& out) {
+  std::error_code error;
+  fs::create_directories(out, error);
+  if (error) return make_error(ErrorCode::Io, fmt::format("cannot create {}: {}", out.string(), error.message()));
+  const auto renderer = FrameRenderer::prepare(options);
+  if (!renderer) return tl::unexpected(renderer.error());
+  const std::string& fingerprint = (*renderer)->fingerprint();
+
+  // The sheet and the frames of an earlier run are read before memory is measured.
+  ContactSheet sheet = make_sheet(frames, options.width, options.height);
+  const RenderReport earlier = keep_frames(finished_before(out, fingerprint), [&](int frame) {
+    return !in_range(frames, frame) || read_into_sheet(sheet, sheet_cell(frames, frame), frame_path(out, frame));
+  });
+  const std::vector<int> missing = frames_to_render(frames, earlier);
+  const int finished_count = frames.count() - static_cast<int>(missing.size());
+  if (options.message && finished_count > 0)
+    options.message(fmt::format("{} of {} frames are finished already", finished_count, frames.count()));
+
+  RenderReport report = earlier;
+  const auto take_frame = [&](const Image& image, const Metadata& metadata, const RenderReport& so_far) {
+    const int frame = so_far.frames.back().frame;
+    if (auto written = write_frame(frame_path(out, frame), image, metadata, options.exposure_stops); !written)
+      return written;
+    sheet.set(sheet_cell(frames, frame), image);
+    report = join_reports(earlier, so_far);
+    return write_record(out / "shot.json", {fingerprint, report});
+  };
+  if (!missing.empty()) {
+    const auto rendered = (*renderer)->render(missing, take_frame);
+    if (!rendered) return tl::unexpected(rendered.error());
+    report = join_reports(earlier, *rendered);
+    // Writing the last frame may have been the peak.
+    if (auto written = write_record(out / "shot.json", {fingerprint, report}); !written)
+      return tl::unexpected(written.error());
+  }
+  if (auto written = write_png(out / "contact_sheet.png", sheet.image(), {options.exposure_stops}); !written)
+    return tl::unexpected(written.error());
+  return keep_frames(report, [&](int frame) { return in_range(frames, frame); });
+}
+
+}  // namespace farfield

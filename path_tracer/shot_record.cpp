@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "path_tracer/shot_record.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+namespace farfield {
+
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+Json frame_to_json(const FrameReport& frame, const std::vector<std::string>& assets) {
+  Json levels = Json::object();
+  for (size_t i = 0; i < std::min(assets.size(), frame.finest_level.size()); ++i)
+    levels[assets[i]] = frame.finest_level[i];
+  return {{"frame", frame.frame},
+          {"seconds", frame.seconds},
+          {"load_seconds", frame.load_seconds},
+          {"accounted_bytes", frame.accounted_bytes},
+          {"rss_bytes", frame.rss_bytes},
+          {"bias", frame.bias},
+          {"rays", frame.rays},
+          {"levels_loaded", frame.levels_loaded},
+          {"fallbacks", frame.fallbacks},
+          {"invalid_samples", frame.invalid_samples},
+          {"finest_level", levels}};
+}
+
+FrameReport frame_from_json(const Json& json, const std::vector<std::string>& assets) {
+  FrameReport frame;
+  json.at("frame").get_to(frame.frame);
+  json.at("seconds").get_to(frame.seconds);
+  json.at("load_seconds").get_to(frame.load_seconds);
+  json.at("accounted_bytes").get_to(frame.accounted_bytes);
+  json.at("rss_bytes").get_to(frame.rss_bytes);
+  json.at("bias").get_to(frame.bias);
+  json.at("rays").get_to(frame.rays);
+  json.at("levels_loaded").get_to(frame.levels_loaded);
+  json.at("fallbacks").get_to(frame.fallbacks);
+  json.at("invalid_samples").get_to(frame.invalid_samples);
+  for (const std::string& asset : assets)
+    frame.finest_level.push_back(json.at("finest_level").at(asset).get<uint32_t>());
+  return frame;
+}
+
+uint64_t beyond_baseline(const RenderReport& report) {
+  return report.peak_rss_bytes - std::min(report.peak_rss_bytes, report.baseline_rss_bytes);
+}
+
+}  // namespace
+
+std::string to_json(const ShotRecord& record) {
+  const RenderReport& report = record.report;
+  Json frames = Json::array();
+  for (const FrameReport& frame : report.frames) frames.push_back(frame_to_json(frame, report.assets));
+  const Json json = {{"budget_bytes", report.budget_bytes},
+                     {"baseline_rss_bytes", report.baseline_rss_bytes},
+                     {"peak_rss_bytes", report.peak_rss_bytes},
+                     {"peak_accounted_bytes", report.peak_accounted_bytes},
+                     {"fingerprint", record.fingerprint},
+                     {"assets", report.assets},
+                     {"frames", frames}};
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::optional<ShotRecord> shot_record_from_json(const std::string& text) {
+  try {
+    const Json json = Json::parse(text);
+    ShotRecord record;
+    RenderReport& report = record.report;
+    json.at("budget_bytes").get_to(report.budget_bytes);
+    json.at("baseline_rss_bytes").get_to(report.baseline_rss_bytes);
+    json.at("peak_rss_bytes").get_to(report.peak_rss_bytes);
+    json.at("peak_accounted_bytes").get_to(report.peak_accounted_bytes);
+    json.at("fingerprint").get_to(record.fingerprint);
+    json.at("assets").get_to(report.assets);
+    for (const Json& frame : json.at("frames")) report.frames.push_back(frame_from_json(frame, report.assets));
+    return record;
+  } catch (const Json::exception&) {
+    return std::nullopt;  // half a file, or somebody else's: the shot starts anew
+  }
+}
+
+RenderReport join_reports(const RenderReport& earlier, const RenderReport& later) {
+  RenderReport joined = later.frames.empty() || beyond_baseline(earlier) > beyond_baseline(later) ? earlier : later;
+  joined.peak_accounted_bytes = std::max(earlier.peak_accounted_bytes, later.peak_accounted_bytes);
+  joined.frames = earlier.frames;
+  joined.frames.insert(joined.frames.end(), later.frames.begin(), later.frames.end());
+  std::stable_sort(joined.frames.begin(), joined.frames.end(),
+                   [](const FrameReport& a, const FrameReport& b) { return a.frame < b.frame; });
+  return joined;
+}
+
+}  // namespace farfield

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// shot.json: what a shot has done so far, for people, for checks, and for the run that goes on with it.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "path_tracer/render_job.h"
+
+namespace farfield {
+
+/// What all runs with one fingerprint have done in a folder.
+struct ShotRecord {
+  std::string fingerprint;  ///< FrameRenderer::fingerprint() of the run that wrote it
+  RenderReport report;
+};
+
+/// {"budget_bytes", "baseline_rss_bytes", "peak_rss_bytes", "peak_accounted_bytes", "fingerprint", "assets": [...],
+/// "frames": [{"frame", "seconds", "load_seconds", "accounted_bytes", "rss_bytes", "bias", "rays", "levels_loaded",
+/// "fallbacks", "invalid_samples", "finest_level": {asset: k}}]}, indented, keys in this order, frames ascending.
+std::string to_json(const ShotRecord& record);
+
+/// Reads what to_json wrote; nothing for any other text.
+std::optional<ShotRecord> shot_record_from_json(const std::string& text);
+
+/// Joins the report of an earlier run, whose frames are kept, with that of the run that went on with it. The memory
+/// figures are those of the run that took more beyond its baseline.
+RenderReport join_reports(const RenderReport& earlier, const RenderReport& later);
+
+}  // namespace farfield

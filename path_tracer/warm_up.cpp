@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "path_tracer/warm_up.h"
+
+#include <fmt/format.h>
+#include <malloc.h>
+
+#include <filesystem>
+
+#include "cache/level_file.h"
+#include "cache/manifest.h"
+#include "path_tracer/integrator.h"
+#include "path_tracer/temporary_file.h"
+
+namespace farfield {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kSheetQuads = 48;  ///< along a side of the sheet that stands for the surface
+constexpr int kBricks = 3;       ///< along a side of the cube that stands for the volume
+constexpr float kSize = 1.0f;    ///< of both
+constexpr uint64_t kBudget = 64 << 20;
+
+// A wavy sheet with every channel that a surface can have.
+void add_sheet(LevelData& level) {
+  const auto row = static_cast<uint32_t>(kSheetQuads + 1);
+  for (uint32_t y = 0; y < row; ++y) {
+    for (uint32_t x = 0; x < row; ++x) {
+      const float u = static_cast<float>(x) / kSheetQuads, v = static_cast<float>(y) / kSheetQuads;
+      level.positions.push_back(kSize * vec3(u, 0.5f + 0.2f * std::sin(9 * u) * std::sin(7 * v), v));
+    }
+  }
+  for (uint32_t y = 0; y < kSheetQuads; ++y) {
+    for (uint32_t x = 0; x < kSheetQuads; ++x) {
+      const uint32_t corner = y * row + x;
+      level.quads.push_back({corner, corner + 1, corner + row + 1, corner + row});
+      level.quad_first_face.push_back(2 * static_cast<uint32_t>(level.quads.size() - 1));
+    }
+  }
+  const size_t faces = 2 * level.quads.size();
+  level.face_diffuse.assign(faces, pack_color(vec3(0.5f)));
+  level.face_specular.assign(faces, pack_color(vec3(0.04f)));
+  level.face_roughness2.assign(faces, pack_unorm8(0.3f));
+  level.face_transmission.assign(faces, pack_color(vec3(0.2f)));
+}
+
+// A cube of haze with every channel that a volume can have.
+void add_haze(LevelData& level) {
+  level.header.brick_dims = ivec3(kBricks);
+  uint32_t payloads = 0;
+  for (uint32_t i = 0; i < kBricks * kBricks * kBricks; ++i) {
+    Brick brick{};
+    brick.mask.fill(~uint64_t{0});
+    for (size_t word = 0; word < 8; ++word) brick.prefix[word] = static_cast<uint16_t>(64 * word);
+    brick.density.fill(128);
+    brick.density_scale = 4.0f;
+    brick.payload_base = payloads;
+    payloads += kBrickVoxels;
+    level.brick_table.push_back(i);
+    level.bricks.push_back(brick);
+  }
+  level.voxel_sggx.assign(payloads, pack_flake_sggx(SymMat3::identity()));
+  level.voxel_diffuse.assign(payloads, pack_color(vec3(0.5f)));
+  level.voxel_specular.assign(payloads, pack_color(vec3(0.04f)));
+  level.voxel_roughness2.assign(payloads, pack_unorm8(0.3f));
+  level.voxel_self_shadowing.assign(payloads, pack_unorm8(0.8f));
+}
+
+Result<LevelEntry> write_warm_up_level(const fs::path& folder, uint32_t number) {
+  LevelData level;
+  const float resolution = kSize / (kBricks * kBrickSide) * std::exp2(static_cast<float>(number) - 1.0f);
+  level.header.level = number;
+  level.header.resolution = resolution;
+  level.header.bounds = {vec3(0.0f), vec3(kSize)};
+  add_sheet(level);
+  if (number == 1) add_haze(level);
+
+  LevelEntry entry;
+  entry.level = number;
+  entry.resolution = static_cast<double>(resolution);
+  entry.grid = static_cast<uint32_t>(std::lround(kSize / resolution));
+  entry.file = fmt::format("level_{:02}.bin", number);
+  const auto bytes = write_level(folder / entry.file, level);
+  if (!bytes) return tl::unexpected(bytes.error());
+  const auto hash = hash_level_file(folder / entry.file);
+  if (!hash) return tl::unexpected(hash.error());
+  entry.file_bytes = *bytes;
+  entry.file_hash = *hash;
+  entry.triangles = face_count(level);
+  entry.voxels = voxel_count(level);
+  entry.bricks = level.bricks.size();
+  entry.resident_bytes = 4 * *bytes;  // far below kBudget, and no less than it takes
+  return entry;
+}
+
+Result<void> write_warm_up_asset(const fs::path& folder) {
+  Manifest manifest;
+  manifest.generator = "warm-up";
+  manifest.source = "none";
+  manifest.bounds = {vec3(0.0f), vec3(kSize)};
+  manifest.base_resolution = static_cast<double>(0.5f * kSize / (kBricks * kBrickSide));
+  for (int corner = 0; corner < 8; ++corner)
+    manifest.hull.push_back(kSize * vec3(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1));
+  for (uint32_t number = 0; number < 2; ++number) {
+    auto entry = write_warm_up_level(folder, number);
+    if (!entry) return tl::unexpected(entry.error());
+    manifest.levels.push_back(*entry);
+  }
+  return write_manifest(folder, manifest);
+}
+
+// Both levels, seen from near and from far, under a light with a disc.
+Result<void> trace_warm_up_asset(const DeviceHandle& device, const fs::path& folder) {
+  RuntimeOptions options;
+  options.budget_bytes = kBudget;
+  auto runtime = Runtime::create(device.get(), options);
+  if (!runtime) return tl::unexpected(runtime.error());
+  const auto asset = (*runtime)->open_asset(folder.string());
+  if (!asset) return tl::unexpected(asset.error());
+  if (auto added = (*runtime)->add_instance(*asset, mat4x3(1.0f)); !added) return tl::unexpected(added.error());
+  const auto scene = make_scene(device, **runtime);
+  if (!scene) return tl::unexpected(scene.error());
+
+  Lights lights;
+  lights.environment = Environment::sun_sky({});
+  TraceOptions trace;
+  trace.samples_per_pixel = 4;
+  Film film(64, 64);
+  for (const float distance : {1.5f, 10.0f}) {
+    const vec3 forward = glm::normalize(vec3(-1.0f));
+    const Camera camera = Camera::perspective(vec3(0.5f * kSize) - kSize * distance * forward, forward,
+                                              vec3(0.0f, 1.0f, 0.0f), 1.0f / distance, film.width(), film.height());
+    (*runtime)->set_cameras({camera.tessellation()});
+    if (auto plan = (*runtime)->plan_frame(); !plan) return tl::unexpected(plan.error());
+    (*runtime)->prefetch();
+    const TraceScene traced{scene->get(), runtime->get(), &lights};
+    if (auto result = path_trace(traced, camera, trace, film); !result) return tl::unexpected(result.error());
+  }
+  return {};
+}
+
+Result<void> write_images(const fs::path& folder, const Image& frame) {
+  if (auto written = write_exr(folder / "frame.exr", frame); !written) return written;
+  return write_png(folder / "frame.png", frame);
+}
+
+}  // namespace
+
+Result<void> warm_up(const DeviceHandle& device, const Image& frame) {
+  auto folder = TemporaryFolder::create();
+  if (!folder) return tl::unexpected(folder.error());
+  if (auto written = write_warm_up_asset(folder->path()); !written) return written;
+  if (auto traced = trace_warm_up_asset(device, folder->path()); !traced) return traced;
+  if (auto written = write_images(folder->path(), frame); !written) return written;
+  // Once more after the trim: what the writers need stays with the process, as it does between frames.
+  malloc_trim(0);
+  return write_images(folder->path(), frame);
+}
+
+}  // namespace farfield

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+// Geometry made on the spot, and two ways to see through it: its triangles and a volume of it.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "base/random.h"
+#include "prefilter/surface.h"
+#include "prefilter/voxelize.h"
+#include "tests/support/test_surfaces.h"
+
+namespace farfield::test {
+
+inline vec3 random_direction(Rng& rng) {
+  const float z = 2 * rng.next() - 1, angle = 2 * kPi * rng.next(), r = std::sqrt(std::max(0.0f, 1 - z * z));
+  return {r * std::cos(angle), r * std::sin(angle), z};
+}
+
+/// Square leaves of two triangles, spread evenly over the unit cube.
+struct LeafCloud {
+  int count = 4000;
+  float leaf_size = 0.02f;  ///< side of a square
+  float flatness = 0;       ///< 0: any normal; 1: all normals along z
+  uint64_t seed = 7;
+};
+
+inline Surface leaf_cloud(const LeafCloud& cloud) {
+  Rng rng(cloud.seed);
+  Surface surface;
+  for (int i = 0; i < cloud.count; ++i) {
+    const vec3 normal = glm::normalize(random_direction(rng) * (1 - cloud.flatness) + vec3(0, 0, 1) * cloud.flatness);
+    const Frame frame(normal);
+    const vec3 middle(rng.next(), rng.next(), rng.next());
+    const auto first = static_cast<uint32_t>(surface.positions.size());
+    for (const vec2 corner : {vec2(-1, -1), vec2(1, -1), vec2(1, 1), vec2(-1, 1)}) {
+      surface.positions.push_back(middle + 0.5f * cloud.leaf_size * (corner.x * frame.x + corner.y * frame.y));
+    }
+    surface.triangles.push_back({first, first + 1, first + 2});
+    surface.triangles.push_back({first, first + 2, first + 3});
+    FaceMaterial material;
+    material.sggx = SymMat3::outer(normal);
+    material.diffuse = vec3(rng.next(), 0.5f, 0.25f);
+    surface.materials.insert(surface.materials.end(), 2, material);
+  }
+  return surface;
+}
+
+/// The triangles, to cast long rays at.
+class MeshScene {
+ public:
+  explicit MeshScene(const Surface& surface) : device_(rtcNewDevice(nullptr)), scene_(rtcNewScene(device_)) {
+    RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+    auto* vertices = static_cast<vec3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                                sizeof(vec3), surface.positions.size()));
+    std::copy(surface.positions.begin(), surface.positions.end(), vertices);
+    auto* triangles = static_cast<uvec3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                                  sizeof(uvec3), surface.triangles.size()));
+    std::copy(surface.triangles.begin(), surface.triangles.end(), triangles);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene_, geometry);
+    rtcReleaseGeometry(geometry);
+    rtcCommitScene(scene_);
+  }
+  ~MeshScene() {
+    rtcReleaseScene(scene_);
+    rtcReleaseDevice(device_);
+  }
+  MeshScene(const MeshScene&) = delete;
+  MeshScene& operator=(const MeshScene&) = delete;
+
+  bool is_hit(const vec3& origin, const vec3& direction) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRay ray{};
+    ray.org_x = origin.x, ray.org_y = origin.y, ray.org_z = origin.z;
+    ray.dir_x = direction.x, ray.dir_y = direction.y, ray.dir_z = direction.z;
+    ray.tfar = INFINITY;
+    ray.mask = 0xffffffffu;
+    rtcOccluded1(scene_, &context, &ray);
+    return ray.tfar < 0;
+  }
+
+ private:
+  RTCDevice device_;
+  RTCScene scene_;
+};
+
+/// A volume as a dense array, to look along long rays.
+class VolumeScene {
+ public:
+  explicit VolumeScene(const SparseVolume& volume) : volume_(volume) {
+    ivec3 upper(std::numeric_limits<int>::min());
+    lower_ = ivec3(std::numeric_limits<int>::max());
+    for (const VoxelBrick& brick : volume.bricks) {
+      lower_ = glm::min(lower_, brick.coordinate * kBrickSide);
+      upper = glm::max(upper, (brick.coordinate + 1) * kBrickSide);
+    }
+    size_ = glm::max(upper - lower_, ivec3(0));
+    voxels_.resize(static_cast<size_t>(size_.x) * static_cast<size_t>(size_.y) * static_cast<size_t>(size_.z));
+    for (const VoxelBrick& brick : volume.bricks) {
+      uint64_t index = brick.first_voxel;
+      for (int i = 0; i < kBrickVoxels; ++i) {
+        if (!(brick.mask[static_cast<size_t>(i >> 6)] >> (i & 63) & 1)) continue;
+        at(brick.coordinate * kBrickSide + ivec3(i & 7, i >> 3 & 7, i >> 6) - lower_) = &volume.voxels[index++];
+      }
+    }
+  }
+
+  /// exp(-optical depth) along the first 6 units of a ray, by equal steps of 1/8 of a voxel.
+  double transmittance(const vec3& origin, const vec3& direction) {
+    const double step = volume_.lattice.voxel_size / 8;
+    double depth = 0;
+    for (double t = 0.5 * step; t < 6; t += step) {
+      const dvec3 p = (dvec3(origin) + t * dvec3(direction) - volume_.lattice.origin) / volume_.lattice.voxel_size;
+      const ivec3 c = ivec3(glm::floor(p)) - lower_;
+      if (glm::any(glm::lessThan(c, ivec3(0))) || glm::any(glm::greaterThanEqual(c, size_))) continue;
+      if (const Voxel* voxel = at(c))
+        depth += step * voxel->density * std::sqrt(std::max(voxel->sggx.quadratic(direction), 0.0f));
+    }
+    return std::exp(-depth);
+  }
+
+ private:
+  const Voxel*& at(const ivec3& c) {
+    return voxels_[static_cast<size_t>(c.x) +
+                   static_cast<size_t>(size_.x) *
+                       (static_cast<size_t>(c.y) + static_cast<size_t>(size_.y) * static_cast<size_t>(c.z))];
+  }
+
+  const SparseVolume& volume_;
+  ivec3 lower_, size_;
+  std::vector<const Voxel*> voxels_;
+};
+
+}  // namespace farfield::test

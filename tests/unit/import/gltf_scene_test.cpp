@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "import/gltf_scene.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+#include "tests/support/gltf_files.h"
+
+namespace farfield {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kAssets = FARFIELD_SHARED_ASSETS;
+constexpr double kForestYfov = 0.5631968779732008;
+
+float distance(const vec3& a, const vec3& b) { return glm::length(a - b); }
+
+/// A scene of one triangle mesh and the given nodes, animations and further top-level members. The binary chunk starts
+/// with the triangle's positions (36 bytes, accessor 0); `extra` follows as buffer view 1.
+std::string scene_file(const std::string& nodes, const std::string& roots, const std::string& members = "",
+                       const std::string& extra = "", const std::string& accessors = "") {
+  const std::string triangle = raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 0});
+  const std::string json = fmt::format(
+      R"({{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[{}]}}],"nodes":[{}],
+      "meshes":[{{"name":"tri","primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
+      "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}}{}],
+      "bufferViews":[{{"buffer":0,"byteLength":36}}{}],"buffers":[{{"byteLength":{}}}]{}}})",
+      roots, nodes, accessors.empty() ? "" : "," + accessors,
+      extra.empty() ? "" : fmt::format(R"(,{{"buffer":0,"byteOffset":36,"byteLength":{}}})", extra.size()),
+      36 + extra.size(), members.empty() ? "" : "," + members);
+  return glb(json, triangle + extra);
+}
+
+TEST(GltfScene, ForestHasItsInstancesSpeciesSunAndCamera) {
+  const fs::path file = kAssets / "forest/forest_pullback.glb";
+  if (!fs::exists(file)) GTEST_SKIP() << file << " is not here";
+  const auto scene = read_gltf_scene(file);
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->meshes.size(), 4u);
+  EXPECT_EQ(scene->meshes[0].asset_name, "small_maple_lo");
+  EXPECT_EQ(scene->meshes[0].triangle_count, 46218u);
+  EXPECT_EQ(scene->meshes[1].triangle_count, 25188u);
+  EXPECT_EQ(scene->meshes[2].triangle_count, 30902u);
+  EXPECT_EQ(scene->instances.size(), 501u);  // 500 trees and the ground
+  uint64_t triangles = 0;
+  for (const GltfInstance& instance : scene->instances) {
+    if (instance.mesh != 3) triangles += scene->meshes[instance.mesh].triangle_count;
+  }
+  EXPECT_EQ(triangles, 18297838u);  // without the ground
+  const vec3 size = scene->bounds_world().size();
+  EXPECT_NEAR(size.x, 3000, 1);
+  EXPECT_NEAR(size.z, 3000, 1);
+  EXPECT_GT(size.y, 20);
+  EXPECT_LT(size.y, 40);
+
+  ASSERT_EQ(scene->lights.size(), 1u);
+  EXPECT_EQ(scene->lights[0].type, GltfLight::Type::Directional);
+  EXPECT_FLOAT_EQ(scene->lights[0].intensity, 3073.5f);
+  EXPECT_LT(scene->lights[0].direction.y, -0.3f);  // shines down
+  ASSERT_EQ(scene->cameras.size(), 1u);
+  EXPECT_NEAR(scene->cameras[0].yfov_rad, kForestYfov, 1e-6);
+  EXPECT_NEAR(scene->cameras[0].aspect, 16.0 / 9, 1e-6);
+}
+
+TEST(GltfScene, ForestCameraPullsBackBy64AlongItsFormula) {
+  const fs::path file = kAssets / "forest/forest_pullback.glb";
+  if (!fs::exists(file)) GTEST_SKIP() << file << " is not here";
+  const auto scene = read_gltf_scene(file);
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_DOUBLE_EQ(scene->start_seconds, 0);
+  EXPECT_DOUBLE_EQ(scene->end_seconds, 5);
+  EXPECT_DOUBLE_EQ(scene->frames_per_second, 24);
+  for (const int frame : {0, 1, 40, 60, 80, 119, 120, 500}) {
+    const double seconds = std::min(scene->seconds_of_frame(frame), 5.0);
+    const GltfCamera camera = scene->camera_at(0, scene->seconds_of_frame(frame));
+    const double distance = std::hypot(camera.position.x, camera.position.z);
+    EXPECT_NEAR(distance / (7.8125 * std::pow(64.0, seconds / 5)), 1, 1e-3) << "frame " << frame;
+    // it looks at the maple, 4.5 m above the ground
+    const vec3 to_tree = glm::normalize(vec3(0, 4.5f, 0) - camera.position);
+    EXPECT_GT(glm::dot(camera.forward, to_tree), 0.995f) << "frame " << frame;
+    EXPECT_GT(camera.up.y, 0.5f);
+  }
+}
+
+TEST(GltfScene, WorldTransformIsTheProductAlongTheChain) {
+  const TempFolder folder;
+  const auto file = folder.write("chain.glb", scene_file(R"({"translation":[1,2,3],"children":[1]},
+          {"rotation":[0,0.70710678,0,0.70710678],"scale":[2,3,4],"children":[2]},
+          {"matrix":[1,0,0,0, 0,0,1,0, 0,-1,0,0, 5,6,7,1],"mesh":0})",
+                                                         "0"));
+  const auto scene = read_gltf_scene(file);
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->instances.size(), 1u);
+  glm::mat4 expected = glm::translate(glm::mat4(1), vec3(1, 2, 3));
+  expected *= glm::mat4_cast(glm::quat(0.70710678f, 0, 0.70710678f, 0));
+  expected = glm::scale(expected, vec3(2, 3, 4));
+  expected *= glm::mat4(1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 5, 6, 7, 1);
+  for (const vec4& p : {vec4(0, 0, 0, 1), vec4(1, 0, 0, 1), vec4(0, 1, 0, 1), vec4(0, 0, 1, 1)}) {
+    EXPECT_LT(distance(scene->instances[0].to_world * p, vec3(expected * p)), 1e-4f);
+  }
+}
+
+TEST(GltfScene, CameraBasisIsOrthonormalUnderScaleAndMirror) {
+  const TempFolder folder;
+  const auto file = folder.write(
+      "camera.glb",
+      scene_file(R"({"scale":[-2,3,0.5],"rotation":[0.1,0.2,0.3,0.927],"children":[1]},
+          {"translation":[0,0,10],"camera":0})",
+                 "0", R"("cameras":[{"type":"orthographic","orthographic":{"xmag":4,"ymag":3,"znear":0,"zfar":9}}])"));
+  const auto scene = read_gltf_scene(file);
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->cameras.size(), 1u);
+  const GltfCamera& c = scene->cameras[0];
+  EXPECT_TRUE(c.is_orthographic);
+  EXPECT_FLOAT_EQ(c.half_width, 4);
+  EXPECT_FLOAT_EQ(c.half_height, 3);
+  EXPECT_NEAR(glm::dot(c.forward, c.right), 0, 1e-6);
+  EXPECT_NEAR(glm::dot(c.forward, c.up), 0, 1e-6);
+  EXPECT_LT(distance(glm::cross(c.right, c.up), -c.forward), 1e-6f);
+}
+
+/// One camera node, animated by two channels that share the key times 0, 1, 3.
+std::string animated_file(const std::string& interpolation, const std::vector<float>& translations,
+                          const std::vector<float>& rotations) {
+  const std::string times = raw<float>({0, 1, 3}), moves = raw(translations), turns = raw(rotations);
+  const std::string accessors = fmt::format(
+      R"({{"bufferView":1,"componentType":5126,"count":3,"type":"SCALAR"}},
+         {{"bufferView":1,"byteOffset":12,"componentType":5126,"count":{},"type":"VEC3"}},
+         {{"bufferView":1,"byteOffset":{},"componentType":5126,"count":{},"type":"VEC4"}})",
+      translations.size() / 3, 12 + moves.size(), rotations.size() / 4);
+  const std::string members = fmt::format(
+      R"("cameras":[{{"type":"perspective","perspective":{{"yfov":1,"znear":0.1}}}}],
+         "animations":[{{"channels":[{{"sampler":0,"target":{{"node":0,"path":"translation"}}}},
+         {{"sampler":1,"target":{{"node":1,"path":"rotation"}}}}],
+         "samplers":[{{"input":1,"output":2,"interpolation":"{0}"}},{{"input":1,"output":3,"interpolation":"{0}"}}]}}])",
+      interpolation);
+  return scene_file(R"({"children":[1]},{"camera":0,"mesh":0})", "0", members, times + moves + turns, accessors);
+}
+
+TEST(GltfScene, LinearKeysInterpolateStraightAndRotationsTheShortWay) {
+  const TempFolder folder;
+  // The last rotation has its sign flipped: the same turn, which must not make the camera go the long way round.
+  const float h = std::sqrt(0.5f);
+  const auto file = folder.write(
+      "linear.glb", animated_file("LINEAR", {0, 0, 0, 4, 0, 0, 4, 8, 0}, {0, 0, 0, 1, 0, h, 0, h, 0, -h, 0, -h}));
+  const auto scene = read_gltf_scene(file);
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_DOUBLE_EQ(scene->end_seconds, 3);
+  EXPECT_LT(distance(scene->camera_at(0, 0.5).position, vec3(2, 0, 0)), 1e-6f);
+  EXPECT_LT(distance(scene->camera_at(0, 2.5).position, vec3(4, 6, 0)), 1e-6f);
+  EXPECT_LT(distance(scene->camera_at(0, -7).position, vec3(0, 0, 0)), 1e-6f);
+  EXPECT_LT(distance(scene->camera_at(0, 99).position, vec3(4, 8, 0)), 1e-6f);
+  EXPECT_LT(distance(scene->camera_at(0, 0.5).forward, vec3(-h, 0, -h)), 1e-6f);  // 45 degrees about y
+  EXPECT_LT(distance(scene->camera_at(0, 2).forward, vec3(-1, 0, 0)), 1e-6f);
+  EXPECT_LT(distance(scene->camera_at(0, std::nan("")).position, vec3(0, 0, 0)), 1e-6f);
+  const auto moved = scene->instances_at(2.5);
+  ASSERT_EQ(moved.size(), 1u);
+  EXPECT_LT(distance(moved[0].to_world[3], vec3(4, 6, 0)), 1e-6f);
+}
+
+TEST(GltfScene, StepKeysHold) {
+  const TempFolder folder;
+  const auto file = folder.write(
+      "step.glb", animated_file("STEP", {0, 0, 0, 4, 0, 0, 4, 8, 0}, {0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 1}));
+  const auto scene = read_gltf_scene(file);
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_EQ(scene->camera_at(0, 0.999).position, vec3(0, 0, 0));
+  EXPECT_EQ(scene->camera_at(0, 1.0).position, vec3(4, 0, 0));
+  EXPECT_EQ(scene->camera_at(0, 2.999).position, vec3(4, 0, 0));
+}
+
+TEST(GltfScene, CubicSplineReproducesACubic) {
+  // x(t) = t^3 - 2 t: a Hermite spline with its values and slopes is that cubic exactly.
+  const auto x = [](double t) { return static_cast<float>(t * t * t - 2 * t); };
+  const auto slope = [](double t) { return static_cast<float>(3 * t * t - 2); };
+  std::vector<float> moves, turns;
+  for (const double t : {0.0, 1.0, 3.0}) {
+    for (const float value : {slope(t), x(t), slope(t)}) moves.insert(moves.end(), {value, 0, 0});
+    turns.insert(turns.end(), {0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0});
+  }
+  const TempFolder folder;
+  const auto scene = read_gltf_scene(folder.write("cubic.glb", animated_file("CUBICSPLINE", moves, turns)));
+  ASSERT_TRUE(scene) << scene.error().message;
+  for (const double t : {0.0, 0.3, 1.0, 1.7, 2.9, 3.0}) EXPECT_NEAR(scene->camera_at(0, t).position.x, x(t), 2e-5) << t;
+}
+
+TEST(GltfScene, AnimationWithBrokenKeysIsRefused) {
+  const TempFolder folder;
+  std::string broken = animated_file("LINEAR", {0, 0, 0, 4, 0, 0, 4, 8, 0}, {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1});
+  const std::string times = raw<float>({0, 1, 3}), falling = raw<float>({0, 3, 1});
+  broken.replace(broken.find(times), times.size(), falling);
+  const auto scene = read_gltf_scene(folder.write("falling.glb", broken));
+  ASSERT_FALSE(scene);
+  EXPECT_NE(scene.error().message.find("do not increase"), std::string::npos) << scene.error().message;
+  // as many values as keys: too few for a spline
+  const auto spline = read_gltf_scene(folder.write(
+      "spline.glb", animated_file("CUBICSPLINE", {0, 0, 0, 4, 0, 0, 4, 8, 0}, {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1})));
+  EXPECT_FALSE(spline);
+}
+
+TEST(GltfScene, NodeCyclesAndSharedChildrenAreRefused) {
+  const TempFolder folder;
+  for (const char* nodes : {R"({"children":[1]},{"children":[0]})", R"({"children":[0]})",
+                            R"({"children":[2]},{"children":[2]},{"mesh":0})", R"({"children":[7]})"}) {
+    const auto scene = read_gltf_scene(folder.write("bad.glb", scene_file(nodes, "0")));
+    ASSERT_FALSE(scene) << nodes;
+    EXPECT_EQ(scene.error().code, ErrorCode::BadFile);
+    EXPECT_NE(scene.error().message.find("bad.glb"), std::string::npos);
+  }
+}
+
+TEST(GltfScene, ChainOf5000NodesIsWalkedWithoutRecursion) {
+  std::string nodes;
+  for (int i = 0; i < 4999; ++i) nodes += fmt::format(R"({{"translation":[0,0,0.5],"children":[{}]}},)", i + 1);
+  const TempFolder folder;
+  const auto scene = read_gltf_scene(folder.write("deep.glb", scene_file(nodes + R"({"mesh":0})", "0")));
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->instances.size(), 1u);
+  EXPECT_FLOAT_EQ(scene->instances[0].to_world[3].z, 2499.5f);
+}
+
+TEST(GltfScene, DeepJsonIsRefusedBeforeAnyRecursiveParser) {
+  const TempFolder folder;
+  const std::string deep = std::string(200000, '[') + std::string(200000, ']');
+  const auto scene = read_gltf_scene(folder.write("deep.gltf", R"({"asset":{"version":"2.0"},"extras":)" + deep + "}"));
+  ASSERT_FALSE(scene);
+  EXPECT_NE(scene.error().message.find("nested deeper"), std::string::npos) << scene.error().message;
+}
+
+TEST(GltfScene, SingularInstancesAreLeftOutWithAWarning) {
+  const TempFolder folder;
+  const auto scene = read_gltf_scene(folder.write(
+      "flat.glb", scene_file(R"({"mesh":0,"scale":[0,1,1]},{"mesh":0,"matrix":[0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0]},
+          {"mesh":0,"scale":[-1,2,0.5],"rotation":[0,0,0,0]})",
+                             "0,1,2")));
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_EQ(scene->instances.size(), 1u);
+  EXPECT_EQ(scene->warnings.size(), 2u);
+}
+
+TEST(GltfScene, LightsKeepTheirPhotometricValueAndDirection) {
+  const TempFolder folder;
+  const auto scene = read_gltf_scene(folder.write(
+      "lights.glb",
+      scene_file(R"({"rotation":[-0.70710678,0,0,0.70710678],"extensions":{"KHR_lights_punctual":{"light":0}}},
+          {"translation":[1,2,3],"extensions":{"KHR_lights_punctual":{"light":1}}},
+          {"extensions":{"KHR_lights_punctual":{"light":9}}})",
+                 "0,1,2",
+                 R"("extensionsRequired":["KHR_lights_punctual"],"extensions":{"KHR_lights_punctual":{"lights":[
+          {"type":"directional","color":[1,0.5,0.25],"intensity":1000},
+          {"type":"spot","intensity":7,"spot":{"innerConeAngle":0.1,"outerConeAngle":0.2}}]}})")));
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->lights.size(), 2u);
+  EXPECT_LT(distance(scene->lights[0].direction, vec3(0, -1, 0)), 1e-6f);
+  EXPECT_EQ(scene->lights[0].color, vec3(1, 0.5f, 0.25f));
+  EXPECT_EQ(scene->lights[0].intensity, 1000);
+  EXPECT_EQ(scene->lights[1].type, GltfLight::Type::Spot);
+  EXPECT_EQ(scene->lights[1].position, vec3(1, 2, 3));
+  EXPECT_FLOAT_EQ(scene->lights[1].outer_cone_rad, 0.2f);
+  EXPECT_EQ(scene->warnings.size(), 1u);  // light 9 does not exist
+}
+
+TEST(GltfScene, AssetNamesAreUniqueAndFitForFiles) {
+  const TempFolder folder;
+  std::string file = scene_file(R"({"mesh":0})", "0");
+  const std::string one = R"({"name":"tri","primitives":[{"attributes":{"POSITION":0}}]})";
+  std::string meshes;
+  for (const char* name : {"a/b", "a b", "", "../x", "A_B"}) {
+    meshes += fmt::format(R"({}{{"name":"{}","primitives":[{{"attributes":{{"POSITION":0}}}}]}})",
+                          meshes.empty() ? "" : ",", name);
+  }
+  const size_t at = file.find(one);
+  std::string json = file.substr(20, file.find(std::string("BIN\0", 4)) - 24);
+  json.replace(at - 20, one.size(), meshes);
+  const auto scene = read_gltf_scene(folder.write("names.glb", glb(json, raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}))));
+  ASSERT_TRUE(scene) << scene.error().message;
+  std::vector<std::string> names;
+  for (const GltfMesh& mesh : scene->meshes) names.push_back(mesh.asset_name);
+  EXPECT_EQ(names, (std::vector<std::string>{"a_b", "a_b_2", "mesh_2", "_._x", "A_B_3"}));
+}
+
+}  // namespace
+}  // namespace farfield
