@@ -21,6 +21,7 @@
 #include "bake/slab_hull.h"
 #include "base/file_io.h"
 #include "base/hash.h"
+#include "base/result.h"
 #include "bvh/level_scene.h"
 #include "cache/level_file.h"
 #include "prefilter/macrosurface.h"
@@ -193,18 +194,14 @@ class Baker {
     last_level_ =
         options_.source_only ? 0 : static_cast<uint32_t>(std::bit_width(options_.finest_grid / options_.coarsest_grid));
 
-    if (auto done = bake_source(); !done) return tl::unexpected<Error>(done.error());
+    FARFIELD_TRY(bake_source());
     for (uint32_t level = 1; level <= last_level_; ++level) {
-      if (auto done = bake_level(level, std::ldexp(finest_resolution, static_cast<int>(level) - 1)); !done) {
-        return tl::unexpected<Error>(done.error());
-      }
+      FARFIELD_TRY(bake_level(level, std::ldexp(finest_resolution, static_cast<int>(level) - 1)));
     }
     report_.manifest.hull = hull_.corners();
     for (const vec3& corner : report_.manifest.hull) report_.manifest.bounds.extend(corner);
-    if (auto done = write_manifest(workspace_.asset_dir(), report_.manifest); !done) {
-      return tl::unexpected<Error>(done.error());
-    }
-    if (auto done = workspace_.publish(); !done) return tl::unexpected<Error>(done.error());
+    FARFIELD_TRY(write_manifest(workspace_.asset_dir(), report_.manifest));
+    FARFIELD_TRY(workspace_.publish());
     report_progress("done", 1);
     return std::move(report_);
   }
@@ -233,15 +230,13 @@ class Baker {
     const SurfaceOrder order = simplify_surface(level, resolution, level_report);
     if (is_cancelled()) return cancelled();
 
-    auto volume = voxelize_rest(level, resolution, level_report);
-    if (!volume) return tl::unexpected<Error>(volume.error());
+    FARFIELD_TRY_LET(auto volume, voxelize_rest(level, resolution, level_report));
 
     report_progress(fmt::format("level {}: write", level), share_done(level, 0.98));
     const Stopwatch watch;
     Result<void> done;
     if (!level_report.worthless) {
-      done =
-          store_level(pack_level(level, resolution, surface_, order, std::move(*volume), from_stored_), level_report);
+      done = store_level(pack_level(level, resolution, surface_, order, std::move(volume), from_stored_), level_report);
     }
     level_report.write_seconds = watch.seconds();
     report_.levels.push_back(level_report);
@@ -290,18 +285,16 @@ class Baker {
       return std::move(*stored);
     }
     if (level != last_level_) {  // the root is always wanted
-      const auto size = estimate_volume(sub_resolution_, lattice, voxelize_options);
-      if (!size) return tl::unexpected<Error>(size.error());
-      if (least_bytes(*size, sub_resolution_, surface_) > most_bytes_worth_writing(level)) {
+      FARFIELD_TRY_LET(const auto size, estimate_volume(sub_resolution_, lattice, voxelize_options));
+      if (least_bytes(size, sub_resolution_, surface_) > most_bytes_worth_writing(level)) {
         level_report.worthless = true;
         level_report.triangles = surface_.triangles.size();
         level_report.voxelize_seconds = watch.seconds();
         return LevelData{};
       }
     }
-    const auto volume = voxelize(sub_resolution_, lattice, voxelize_options);
-    if (!volume) return tl::unexpected<Error>(volume.error());
-    LevelData packed = pack_volume(*volume);
+    FARFIELD_TRY_LET(const auto volume, voxelize(sub_resolution_, lattice, voxelize_options));
+    LevelData packed = pack_volume(volume);
     if (packed.has_volume()) {
       if (const auto stored = workspace_.store_volume(key, packed); !stored) {
         report_.warnings.push_back("an interrupted bake could not be resumed: " + stored.error().message);
@@ -320,9 +313,9 @@ class Baker {
     if (!level.has_surface() && !level.has_volume()) return {};  // too thin for any ray to have hit it
 
     const LevelView view = view_of(level);
-    const auto cost = options_.measure_resident ? options_.measure_resident(view) : measure_level_scene(view);
-    if (!cost) return tl::unexpected<Error>(cost.error());
-    if (cost->resident_bytes > most_bytes_worth_writing(number)) return {};
+    FARFIELD_TRY_LET(const auto cost,
+                     options_.measure_resident ? options_.measure_resident(view) : measure_level_scene(view));
+    if (cost.resident_bytes > most_bytes_worth_writing(number)) return {};
     level_report.is_written = true;
 
     LevelEntry entry;
@@ -333,15 +326,13 @@ class Baker {
     entry.triangles = face_count(level);
     entry.voxels = voxel_count(level);
     entry.bricks = level.bricks.size();
-    entry.resident_bytes = cost->resident_bytes;
-    entry.build_peak_bytes = cost->build_peak_bytes;
+    entry.resident_bytes = cost.resident_bytes;
+    entry.build_peak_bytes = cost.build_peak_bytes;
     const fs::path path = workspace_.asset_dir() / entry.file;
-    const auto bytes = write_level(path, level);
-    if (!bytes) return tl::unexpected<Error>(bytes.error());
-    entry.file_bytes = *bytes;
-    const auto hash = hash_level_file(path);
-    if (!hash) return tl::unexpected<Error>(hash.error());
-    entry.file_hash = *hash;
+    FARFIELD_TRY_LET(const auto bytes, write_level(path, level));
+    entry.file_bytes = bytes;
+    FARFIELD_TRY_LET(const auto hash, hash_level_file(path));
+    entry.file_hash = hash;
     report_.manifest.levels.push_back(entry);
 
     add_to_hull(view, hull_);
@@ -390,7 +381,7 @@ class Baker {
 }  // namespace
 
 Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeOptions& options) {
-  if (auto checked = check_options(options); !checked) return tl::unexpected<Error>(checked.error());
+  FARFIELD_TRY(check_options(options));
   // What is no asset cannot be up to date: refused before the import, which may take minutes. An asset with other
   // files in it may be; then they do no harm.
   if (auto checked = check_replaceable(out); !checked && !read_manifest(out)) {
@@ -398,10 +389,9 @@ Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeO
   }
   const Stopwatch watch;
   if (options.progress) options.progress("import", 0);
-  auto asset = import_asset(source, options.import);
-  if (!asset) return tl::unexpected<Error>(asset.error());
+  FARFIELD_TRY_LET(auto asset, import_asset(source, options.import));
   const double import_seconds = watch.seconds();
-  auto report = bake(std::move(*asset), source.filename().string(), out, options);
+  auto report = bake(std::move(asset), source.filename().string(), out, options);
   if (report) {
     report->import_seconds = import_seconds;
     report->total_seconds += import_seconds;
@@ -411,7 +401,7 @@ Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeO
 
 Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, const fs::path& out,
                         const BakeOptions& options) {
-  if (auto checked = check_options(options); !checked) return tl::unexpected<Error>(checked.error());
+  FARFIELD_TRY(check_options(options));
   const Stopwatch watch;
   BakeReport report;
   report.warnings = std::move(asset.warnings);
@@ -425,9 +415,8 @@ Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, con
     report.total_seconds = watch.seconds();
     return report;
   }
-  auto workspace = BakeWorkspace::open(out);
-  if (!workspace) return tl::unexpected<Error>(workspace.error());
-  auto baked = Baker(options, std::move(asset.surface), std::move(*workspace), std::move(report)).run();
+  FARFIELD_TRY_LET(auto workspace, BakeWorkspace::open(out));
+  auto baked = Baker(options, std::move(asset.surface), std::move(workspace), std::move(report)).run();
   if (baked) baked->total_seconds = watch.seconds();
   return baked;
 }

@@ -22,6 +22,7 @@
 #include <utility>
 
 #include "base/hash.h"
+#include "base/result.h"
 #include "cache/level_file.h"
 #include "cache/manifest.h"
 
@@ -159,12 +160,11 @@ BakeWorkspace::~BakeWorkspace() {
 
 Result<BakeWorkspace> BakeWorkspace::open(const fs::path& out_path) {
   const fs::path out = without_trailing_slash(out_path);
-  if (auto checked = check_replaceable(out); !checked) return tl::unexpected<Error>(checked.error());
+  FARFIELD_TRY(check_replaceable(out));
   fs::path folder = out;
   folder += ".partial";
-  const auto lock = lock_folder(folder);
-  if (!lock) return tl::unexpected<Error>(lock.error());
-  BakeWorkspace workspace(out, folder, *lock);
+  FARFIELD_TRY_LET(const auto lock, lock_folder(folder));
+  BakeWorkspace workspace(out, folder, lock);
   std::error_code error;
   fs::remove_all(workspace.asset_dir(), error);  // of an interrupted bake
   if (!error) fs::create_directory(workspace.asset_dir(), error);
@@ -193,13 +193,12 @@ std::optional<LevelData> BakeWorkspace::load_volume(uint64_t key) const {
 }
 
 Result<void> BakeWorkspace::store_volume(uint64_t key, const LevelData& volume) const {
-  const auto written = write_level(volume_path(key), volume);
-  if (!written) return tl::unexpected<Error>(written.error());
+  FARFIELD_TRY(write_level(volume_path(key), volume));
   return {};
 }
 
 Result<void> BakeWorkspace::publish() {
-  if (auto checked = check_replaceable(out_); !checked) return checked;
+  FARFIELD_TRY(check_replaceable(out_));
   std::error_code error;
   const fs::path aside = folder_ / "previous";
   const int renamed =

@@ -13,6 +13,7 @@
 #include <system_error>
 
 #include "base/bytes.h"
+#include "base/result.h"
 
 namespace farfield {
 
@@ -166,15 +167,14 @@ Result<RegularFile> open_regular_file(const fs::path& path) {
 }
 
 Result<std::string> read_small_file(const fs::path& path, uint64_t max_bytes) {
-  const Result<RegularFile> file = open_regular_file(path);
-  if (!file) return tl::unexpected(file.error());
-  if (file->bytes > max_bytes) {
+  FARFIELD_TRY_LET(const auto file, open_regular_file(path));
+  if (file.bytes > max_bytes) {
     return make_error(ErrorCode::BadFile, fmt::format("{} has {}; at most {} is expected", path.string(),
-                                                      format_bytes(file->bytes), format_bytes(max_bytes)));
+                                                      format_bytes(file.bytes), format_bytes(max_bytes)));
   }
-  std::string text(file->bytes, '\0');
+  std::string text(file.bytes, '\0');
   for (size_t done = 0; done < text.size();) {
-    const ssize_t got = ::read(file->descriptor.get(), text.data() + done, text.size() - done);
+    const ssize_t got = ::read(file.descriptor.get(), text.data() + done, text.size() - done);
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) {
       return make_error(ErrorCode::Io, fmt::format("cannot read {}: {}", path.string(),

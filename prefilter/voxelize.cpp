@@ -14,6 +14,7 @@
 
 #include "base/hash.h"
 #include "base/parallel.h"
+#include "base/result.h"
 #include "prefilter/density.h"
 #include "prefilter/ray_scene.h"
 #include "prefilter/self_shadowing.h"
@@ -289,16 +290,13 @@ Result<std::vector<std::vector<Voxel>>> measure_bricks(const Surface& geometry, 
 }  // namespace
 
 Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options) {
-  if (auto checked = check_arguments(geometry, lattice, options); !checked) {
-    return tl::unexpected<Error>(checked.error());
-  }
+  FARFIELD_TRY(check_arguments(geometry, lattice, options));
   SparseVolume volume;
   volume.lattice = lattice;
   VoxelSet candidates = find_candidates(geometry, lattice);
-  auto voxels = measure_bricks(geometry, lattice, candidates, 1, options);
-  if (!voxels) return tl::unexpected<Error>(voxels.error());
-  for (size_t i = 0; i < voxels->size(); ++i) {
-    std::vector<Voxel>& of_brick = (*voxels)[i];
+  FARFIELD_TRY_LET(auto voxels, measure_bricks(geometry, lattice, candidates, 1, options));
+  for (size_t i = 0; i < voxels.size(); ++i) {
+    std::vector<Voxel>& of_brick = voxels[i];
     if (of_brick.empty()) continue;
     volume.bricks.push_back({candidates.coordinates[i], candidates.masks[i], volume.voxels.size()});
     volume.voxels.insert(volume.voxels.end(), of_brick.begin(), of_brick.end());
@@ -310,17 +308,14 @@ Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& latti
 Result<VolumeSize> estimate_volume(const Surface& geometry, const VoxelLattice& lattice,
                                    const VoxelizeOptions& options) {
   constexpr size_t kStride = 32, kEnoughBricks = 64;
-  if (auto checked = check_arguments(geometry, lattice, options); !checked) {
-    return tl::unexpected<Error>(checked.error());
-  }
+  FARFIELD_TRY(check_arguments(geometry, lattice, options));
   VolumeSize size;
   VoxelSet candidates = find_candidates(geometry, lattice);
   if (candidates.coordinates.size() < kStride * kEnoughBricks) return size;
   VoxelizeOptions quietly = options;
   quietly.progress = nullptr;
-  const auto voxels = measure_bricks(geometry, lattice, candidates, kStride, quietly);
-  if (!voxels) return tl::unexpected<Error>(voxels.error());
-  for (const std::vector<Voxel>& of_brick : *voxels) {
+  FARFIELD_TRY_LET(const auto voxels, measure_bricks(geometry, lattice, candidates, kStride, quietly));
+  for (const std::vector<Voxel>& of_brick : voxels) {
     size.voxels += kStride * of_brick.size();
     size.bricks += of_brick.empty() ? 0 : kStride;
   }

@@ -17,6 +17,7 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "base/result.h"
 #include "bvh/bvh_device.h"
 #include "bvh/instance_geometry.h"
 #include "cache/loader_thread.h"
@@ -159,15 +160,14 @@ Result<AssetId> Runtime::Impl::open(const std::filesystem::path& folder) {
     if (assets[i]->folder == folder) return AssetId{i};
   }
   loader.forget();  // its thread must not meet tables that grow, nor take the room of the root
-  auto asset = read_asset(folder);
-  if (!asset) return tl::unexpected(asset.error());
-  if (auto root = load_root(**asset); !root) {
-    refused.push_back(std::move(*asset));
+  FARFIELD_TRY_LET(auto asset, read_asset(folder));
+  if (auto root = load_root(*asset); !root) {
+    refused.push_back(std::move(asset));
     return tl::unexpected(root.error());
   }
-  (*asset)->traced.finest_slot = (*asset)->traced.slot_count() - 1;  // until a plan says otherwise
-  geometry.assets.push_back(&(*asset)->traced);
-  assets.push_back(std::move(*asset));
+  asset->traced.finest_slot = asset->traced.slot_count() - 1;  // until a plan says otherwise
+  geometry.assets.push_back(&asset->traced);
+  assets.push_back(std::move(asset));
   levels.set_other_bytes(fixed_bytes());
   return AssetId{static_cast<uint32_t>(assets.size() - 1)};
 }
@@ -186,11 +186,10 @@ Result<void> Runtime::Impl::load_root(OpenAsset& asset) {
   loader.resize(levels.size());
 
   // Roots come first: what an earlier plan has loaded beside them may be in the way, and the next plan decides anew.
-  const auto plan = plan_roots(asset);
-  if (!plan) return tl::unexpected(plan.error());
+  FARFIELD_TRY_LET(const auto plan, plan_roots(asset));
   const size_t root = asset.items.back();
   const uint64_t needed = levels.resident_bytes(root) + levels.build_peak_bytes(root) + asset.table_bytes();
-  if (levels.stats().accounted_bytes + needed > options.budget_bytes) apply(*plan);
+  if (levels.stats().accounted_bytes + needed > options.budget_bytes) apply(plan);
 
   opening = &asset;
   opening_error.reset();
@@ -342,11 +341,10 @@ Runtime::~Runtime() = default;
 
 Result<std::unique_ptr<Runtime>> Runtime::create(RTCDevice host_device, const RuntimeOptions& options) {
   if (!host_device) return make_error(ErrorCode::InvalidArgument, "Runtime::create needs the host's Embree device");
-  if (auto valid = check_options(options); !valid) return tl::unexpected(valid.error());
-  auto device = BvhDevice::create();
-  if (!device) return tl::unexpected(device.error());
+  FARFIELD_TRY(check_options(options));
+  FARFIELD_TRY_LET(auto device, BvhDevice::create());
   std::unique_ptr<Runtime> runtime(new Runtime);
-  runtime->impl_ = std::make_unique<Impl>(host_device, options, std::move(*device));
+  runtime->impl_ = std::make_unique<Impl>(host_device, options, std::move(device));
   return runtime;
 }
 
@@ -377,10 +375,10 @@ Result<InstanceId> Runtime::add_instance(AssetId asset, const glm::mat4x3& local
   }
   std::vector<InstanceRecord>& instances = impl_->geometry.instances;
   if (instances.size() >= kNoInstance) return make_error(ErrorCode::InvalidArgument, "too many instances");
-  auto record = make_instance(asset.value, with_origin(local_to_world, impl_->assets[asset.value]->origin));
-  if (!record) return tl::unexpected(record.error());
-  record->footprint.world_to_r0 = impl_->options.lod_scale / largest_stretch(local_to_world);
-  instances.push_back(*record);
+  FARFIELD_TRY_LET(auto record,
+                   make_instance(asset.value, with_origin(local_to_world, impl_->assets[asset.value]->origin)));
+  record.footprint.world_to_r0 = impl_->options.lod_scale / largest_stretch(local_to_world);
+  instances.push_back(record);
   return InstanceId{static_cast<uint32_t>(instances.size() - 1)};
 }
 
