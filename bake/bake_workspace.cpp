@@ -177,19 +177,7 @@ fs::path BakeWorkspace::volume_path(uint64_t key) const { return folder_ / ("vol
 std::optional<LevelData> BakeWorkspace::load_volume(uint64_t key) const {
   const auto file = LevelFile::open(volume_path(key), LevelCheck::Full);
   if (!file) return std::nullopt;
-  const LevelView& view = (*file)->view();
-  LevelData volume;
-  volume.header = view.header;
-  const auto copy = [](const auto& from, auto& to) { to.assign(from.begin(), from.end()); };
-  copy(view.brick_table, volume.brick_table);
-  copy(view.bricks, volume.bricks);
-  copy(view.voxel_sggx, volume.voxel_sggx);
-  copy(view.voxel_diffuse, volume.voxel_diffuse);
-  copy(view.voxel_specular, volume.voxel_specular);
-  copy(view.voxel_roughness2, volume.voxel_roughness2);
-  copy(view.voxel_transmission, volume.voxel_transmission);
-  copy(view.voxel_self_shadowing, volume.voxel_self_shadowing);
-  return volume;
+  return copy_of((*file)->view());
 }
 
 Result<void> BakeWorkspace::store_volume(uint64_t key, const LevelData& volume) const {

@@ -6,7 +6,6 @@
 
 #include <array>
 #include <cerrno>
-#include <system_error>
 #include <vector>
 
 #include "base/file_io.h"
@@ -104,8 +103,7 @@ Result<std::unique_ptr<LevelFile>> LevelFile::open(const std::filesystem::path& 
   }
   void* map = ::mmap(nullptr, file.bytes, PROT_READ, MAP_PRIVATE, file.descriptor.get(), 0);
   if (map == MAP_FAILED) {
-    return make_error(ErrorCode::Io, fmt::format("cannot map {}: {}", path.string(),
-                                                 std::error_code(errno, std::generic_category()).message()));
+    return make_error(ErrorCode::Io, fmt::format("cannot map {}: {}", path.string(), system_words(errno)));
   }
   std::unique_ptr<LevelFile> level(new LevelFile);  // owns the map from here on
   level->map_ = static_cast<const std::byte*>(map);

@@ -11,12 +11,12 @@
 #include "bake/bake.h"
 #include "base/hash.h"
 #include "base/result.h"
+#include "base/temporary_file.h"
 #include "cache/level_file.h"
 #include "evaluate/sheet.h"
 #include "evaluate/views.h"
 #include "path_tracer/asset_view.h"
 #include "path_tracer/environment.h"
-#include "path_tracer/temporary_file.h"
 
 namespace farfield {
 namespace {

@@ -7,10 +7,10 @@
 #include <filesystem>
 
 #include "base/result.h"
+#include "base/temporary_file.h"
 #include "cache/level_file.h"
 #include "cache/manifest.h"
 #include "path_tracer/integrator.h"
-#include "path_tracer/temporary_file.h"
 
 namespace farfield {
 
