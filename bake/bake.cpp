@@ -202,14 +202,14 @@ class Baker {
     for (const vec3& corner : report_.manifest.hull) report_.manifest.bounds.extend(corner);
     FARFIELD_TRY(write_manifest(workspace_.asset_dir(), report_.manifest));
     FARFIELD_TRY(workspace_.publish());
-    report_progress("done", 1);
+    options_.job.report(1, "done");
     return std::move(report_);
   }
 
  private:
   /// Level 0: the source as it is.
   Result<void> bake_source() {
-    report_progress("level 0: write", 0);
+    options_.job.report(0, "level 0: write");
     LevelReport level_report;
     level_report.grid = 2 * options_.finest_grid;
     const Stopwatch watch;
@@ -228,11 +228,11 @@ class Baker {
     level_report.grid = options_.finest_grid >> (level - 1);
 
     const SurfaceOrder order = simplify_surface(level, resolution, level_report);
-    if (is_cancelled()) return cancelled();
+    if (options_.job.is_cancelled()) return cancelled();
 
     FARFIELD_TRY_LET(auto volume, voxelize_rest(level, resolution, level_report));
 
-    report_progress(fmt::format("level {}: write", level), share_done(level, 0.98));
+    options_.job.report(share_done(level, 0.98), fmt::format("level {}: write", level));
     const Stopwatch watch;
     Result<void> done;
     if (!level_report.worthless) {
@@ -245,16 +245,16 @@ class Baker {
 
   /// Steps A and S: what is no longer surface at this resolution leaves surface_, the rest is simplified.
   SurfaceOrder simplify_surface(uint32_t level, double resolution, LevelReport& level_report) {
-    report_progress(fmt::format("level {}: analyse", level), share_done(level, 0));
+    options_.job.report(share_done(level, 0), fmt::format("level {}: analyse", level));
     const Stopwatch analysis;
     const auto is_macrosurface = classify_macrosurface(surface_, static_cast<float>(resolution));
     const SplitSurface parts = split(surface_, is_macrosurface, sub_resolution_);
     level_report.macrosurface_triangles = parts.macrosurface.triangles.size();
     level_report.voxelized_triangles = sub_resolution_.triangles.size();
     level_report.analysis_seconds = analysis.seconds();
-    if (is_cancelled()) return {};
+    if (options_.job.is_cancelled()) return {};
 
-    report_progress(fmt::format("level {}: simplify", level), share_done(level, 0.03));
+    options_.job.report(share_done(level, 0.03), fmt::format("level {}: simplify", level));
     const Stopwatch simplification;
     const SimplifyResult simplified = simplify(parts.macrosurface, {.resolution = static_cast<float>(resolution)});
     SurfaceOrder order = order_surface(simplified.surface);
@@ -271,14 +271,13 @@ class Baker {
   /// Step V, or its result from an interrupted bake.
   Result<LevelData> voxelize_rest(uint32_t level, double resolution, LevelReport& level_report) {
     const std::string stage = fmt::format("level {}: voxelise", level);
-    report_progress(stage, share_done(level, 0.05));
+    options_.job.report(share_done(level, 0.05), stage);
     const Stopwatch watch;
     const VoxelLattice lattice{lattice_origin_, resolution};
     const VoxelizeOptions voxelize_options{
         .rays_per_voxel = options_.rays_per_voxel,
         .seed = level,
-        .cancel = options_.cancel,
-        .progress = [&](double done) { report_progress(stage, share_done(level, 0.05 + 0.92 * done)); }};
+        .job = options_.job.step(stage, share_done(level, 0.05), share_done(level, 0.97))};
     const uint64_t key = volume_key(sub_resolution_, lattice, voxelize_options);
     if (auto stored = workspace_.load_volume(key)) {
       level_report.resumed = true;
@@ -309,7 +308,7 @@ class Baker {
     const uint32_t number = level.header.level;
     level_report.triangles = face_count(level);
     level_report.voxels = voxel_count(level);
-    if (is_cancelled()) return cancelled();
+    if (options_.job.is_cancelled()) return cancelled();
     if (!level.has_surface() && !level.has_volume()) return {};  // too thin for any ray to have hit it
 
     const LevelView view = view_of(level);
@@ -348,7 +347,6 @@ class Baker {
     return level == last_level_ ? before - std::min<uint64_t>(before, 1) : before - before / 10;
   }
 
-  bool is_cancelled() const { return options_.cancel && options_.cancel->load(std::memory_order_relaxed); }
   static tl::unexpected<Error> cancelled() { return make_error(ErrorCode::Cancelled, "bake: cancelled"); }
 
   /// How much of the whole bake is done when `part` of a level is: levels are weighted by about the rays they cast.
@@ -361,10 +359,6 @@ class Baker {
     }
     constexpr double kSource = 0.05;  // import and level 0
     return kSource + (1 - kSource) * (before + part * weight(level)) / all;
-  }
-
-  void report_progress(const std::string& stage, double done) const {
-    if (options_.progress) options_.progress(stage, done);
   }
 
   const BakeOptions& options_;
@@ -388,7 +382,7 @@ Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeO
     return tl::unexpected<Error>(checked.error());
   }
   const Stopwatch watch;
-  if (options.progress) options.progress("import", 0);
+  options.job.report(0, "import");
   FARFIELD_TRY_LET(auto asset, import_asset(source, options.import));
   const double import_seconds = watch.seconds();
   auto report = bake(std::move(asset), source.filename().string(), out, options);

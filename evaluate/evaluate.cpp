@@ -85,15 +85,13 @@ Result<Manifest> bake_source(const EvaluateOptions& options, const fs::path& fol
   BakeOptions bake_options;
   bake_options.source_only = true;
   bake_options.import = options.import;
-  bake_options.cancel = options.cancel;
-  if (options.progress)
-    bake_options.progress = [&](const std::string&, double) { options.progress("importing the source", 0.0); };
+  bake_options.job = options.job.step("importing the source", 0.0, 0.0);
   FARFIELD_TRY_LET(auto report, bake(options.source, folder, bake_options));
   return std::move(report.manifest);
 }
 
 Result<Parts> render_parts(const AssetView& asset, const OrthoView& view, int samples_per_pixel, uint64_t seed,
-                           const Lights& lights, const std::atomic<bool>* cancel) {
+                           const Lights& lights, const Job& job) {
   ViewOptions options;
   options.center = view.center;
   options.direction = view.direction;
@@ -105,7 +103,7 @@ Result<Parts> render_parts(const AssetView& asset, const OrthoView& view, int sa
   Parts parts;
   for (uint64_t render = 0; render < kParts / 2; ++render) {
     options.trace.seed = mix64(seed, render);
-    FARFIELD_TRY_LET(auto images, asset.render(options, lights, cancel));
+    FARFIELD_TRY_LET(auto images, asset.render(options, lights, job));
     for (Image& half : images.half) parts.push_back(std::move(half));
   }
   return parts;
@@ -207,9 +205,8 @@ class Evaluator {
     FARFIELD_TRY_LET(auto asset, AssetView::open(options_.asset, static_cast<float>(plan.entry.level)));
     ErrorAccumulator accumulator;
     for (size_t i = 0; i < plan.views.size(); ++i) {
-      if (options_.progress)
-        options_.progress(fmt::format("level {}, view {}/{}", plan.entry.level, i + 1, plan.views.size()),
-                          done_cost_ / total_cost_);
+      options_.job.report(done_cost_ / total_cost_,
+                          fmt::format("level {}, view {}/{}", plan.entry.level, i + 1, plan.views.size()));
       FARFIELD_TRY(evaluate_view(plan, i, *asset, accumulator));
       done_cost_ += plan.cost() / static_cast<double>(plan.views.size());
     }
@@ -223,8 +220,10 @@ class Evaluator {
                              ErrorAccumulator& accumulator) {
     const OrthoView& view = plan.views[index];
     const uint64_t seed = mix64(mix64(options_.seed, plan.entry.level), 2 * index);
-    FARFIELD_TRY_LET(auto source, render_parts(source_, view, plan.samples_per_pixel, seed, lights_, options_.cancel));
-    FARFIELD_TRY_LET(auto level, render_parts(asset, view, plan.samples_per_pixel, seed + 1, lights_, options_.cancel));
+    FARFIELD_TRY_LET(auto source,
+                     render_parts(source_, view, plan.samples_per_pixel, seed, lights_, options_.job.quiet()));
+    FARFIELD_TRY_LET(auto level,
+                     render_parts(asset, view, plan.samples_per_pixel, seed + 1, lights_, options_.job.quiet()));
     FARFIELD_TRY(accumulator.add_view(source, level));
 
     const bool in_sheet = !options_.sheet.empty() && index == 0;

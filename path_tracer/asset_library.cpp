@@ -27,10 +27,6 @@ namespace {
 
 constexpr std::chrono::milliseconds kPollInterval{10};
 
-bool is_cancelled(const RenderOptions& options) {
-  return options.cancel != nullptr && options.cancel->load(std::memory_order_relaxed);
-}
-
 // "forest" for forest.glb, forest.gltf, forest.glb.gz.
 std::string scene_name(const fs::path& scene) {
   fs::path name = scene.filename();
@@ -66,7 +62,7 @@ Result<int> wait_for(pid_t child, const RenderOptions& options) {
       if (asked_to_stop) return make_error(ErrorCode::Cancelled, "cancelled");
       return status;
     }
-    if (!asked_to_stop && is_cancelled(options)) {
+    if (!asked_to_stop && options.job.is_cancelled()) {
       kill(child, SIGTERM);
       asked_to_stop = true;
     }
@@ -102,7 +98,7 @@ Result<void> bake_mesh(const GltfScene& scene, const RenderOptions& options, siz
   FARFIELD_TRY_LET(const auto child, start(bake_command(options, mesh, folder)));
   FARFIELD_TRY_LET(const auto status, wait_for(child, options));
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
-  if (is_cancelled(options)) return make_error(ErrorCode::Cancelled, "cancelled");
+  if (options.job.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
   const std::string how = WIFSIGNALED(status) ? fmt::format("signal {}", WTERMSIG(status))
                                               : fmt::format("exit code {}", WEXITSTATUS(status));
   return make_error(ErrorCode::BadFile, fmt::format("{}: baking mesh {} \"{}\" failed ({})", options.scene.string(),

@@ -50,8 +50,7 @@ const std::vector<LevelInfo>& AssetView::levels() const { return impl_->runtime-
 
 Stats AssetView::stats() const { return impl_->runtime->stats(); }
 
-Result<ViewImages> AssetView::render(const ViewOptions& options, const Lights& lights,
-                                     const std::atomic<bool>* cancel) const {
+Result<ViewImages> AssetView::render(const ViewOptions& options, const Lights& lights, const Job& job) const {
   // Rays start outside of the asset, however far from its middle the view's centre is.
   const Box3 box = bounds();
   const float distance = glm::length(box.size()) + glm::length(options.center - box.center());
@@ -62,7 +61,7 @@ Result<ViewImages> AssetView::render(const ViewOptions& options, const Lights& l
   trace.transparent = true;
   Film film(options.width, options.height, true);
   const TraceScene scene{impl_->scene.get(), impl_->runtime.get(), &lights};
-  if (auto traced = path_trace(scene, camera, trace, film, {}, cancel); !traced) return tl::unexpected(traced.error());
+  FARFIELD_TRY(path_trace(scene, camera, trace, film, job));
   return ViewImages{select_channels(film.image(), {"R", "G", "B", "A"}), {film.half(0), film.half(1)}};
 }
 

@@ -135,12 +135,12 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     }
 
     const Camera camera = make_camera(scene_, seconds, options_.width, options_.height);
-    const auto progress = [&](double done) {
-      if (!options_.progress) return;
-      options_.progress((static_cast<double>(i) + done) / static_cast<double>(frames.size()),
-                        fmt::format("frame {} ({}/{})", frames[i], i + 1, frames.size()));
+    const auto done_after = [&](size_t count) {
+      return static_cast<double>(count) / static_cast<double>(frames.size());
     };
-    FARFIELD_TRY_LET(auto frame, session->render(camera, lights_, options_, film, progress));
+    const Job job = options_.job.step(fmt::format("frame {} ({}/{})", frames[i], i + 1, frames.size()), done_after(i),
+                                      done_after(i + 1));
+    FARFIELD_TRY_LET(auto frame, session->render(camera, lights_, options_, film, job));
     frame.frame = frames[i];
     report_problems(options_, frame);
     report.frames.push_back(std::move(frame));

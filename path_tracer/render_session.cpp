@@ -48,7 +48,7 @@ Result<std::unique_ptr<RenderSession>> RenderSession::open(const DeviceHandle& d
 }
 
 Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& lights, const RenderOptions& options,
-                                          Film& film, const std::function<void(double done)>& done) {
+                                          Film& film, const Job& job) {
   const auto start = std::chrono::steady_clock::now();
   const Stats before = runtime_->stats();
   runtime_->set_cameras({camera.tessellation()});
@@ -56,7 +56,7 @@ Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& li
   runtime_->prefetch();
 
   const TraceScene scene{scene_.get(), runtime_.get(), &lights};
-  FARFIELD_TRY_LET(const auto traced, path_trace(scene, camera, options.trace, film, done, options.cancel));
+  FARFIELD_TRY_LET(const auto traced, path_trace(scene, camera, options.trace, film, job));
 
   const Stats after = runtime_->stats();
   FrameReport report;

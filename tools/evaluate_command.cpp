@@ -56,8 +56,7 @@ Result<void> run_evaluate(EvaluateArguments& arguments) {
   options.images = arguments.images;
   options.first_level = arguments.levels.first;
   options.last_level = arguments.levels.last;
-  options.progress = [&](const std::string& stage, double done) { progress.update(done, stage); };
-  options.cancel = &catch_interrupts();
+  options.job = {[&](double done, const std::string& stage) { progress.update(done, stage); }, &catch_interrupts()};
 
   const auto evaluation = evaluate(options);
   progress.clear();
