@@ -64,21 +64,36 @@ std::string canonical_options(const BakeOptions& options) {
                      options.coarsest_grid, options.rays_per_voxel, options.import.mesh, kVoxelizeVersion);
 }
 
-/// The manifest of `out`, if it is whole and was baked from the same source with the same options by this version.
-std::optional<Manifest> find_up_to_date(const fs::path& out, const Manifest& wanted) {
-  auto manifest = read_manifest(out);
-  if (!manifest || manifest->source_hash != wanted.source_hash || manifest->options != wanted.options ||
-      manifest->generator != wanted.generator || manifest->source != wanted.source) {
-    return std::nullopt;
+/// What a bake of `source` with these options writes into its manifest, but for the levels.
+Manifest make_manifest(const std::string& source, uint64_t source_hash, const BakeOptions& options) {
+  Manifest manifest;
+  manifest.generator = "farfield " FARFIELD_VERSION;
+  manifest.source = source;
+  manifest.source_hash = source_hash;
+  manifest.options = canonical_options(options);
+  return manifest;
+}
+
+bool are_same_bake(const Manifest& a, const Manifest& b) {
+  return a.source_hash == b.source_hash && a.options == b.options && a.generator == b.generator && a.source == b.source;
+}
+
+/// Whether every level's file is the one that the manifest means.
+bool is_whole(const fs::path& asset, const Manifest& manifest) {
+  return std::ranges::all_of(manifest.levels, [&](const LevelEntry& entry) {
+    const auto file = LevelFile::open_known(asset / entry.file, entry.file_hash);
+    return file && (*file)->file_bytes() == entry.file_bytes;
+  });
+}
+
+/// Warnings name files as the source sees them: the same asset whatever its folder is called.
+std::vector<std::string> without_folder(std::vector<std::string> warnings, const fs::path& folder) {
+  const std::string prefix = (folder / "").string();
+  if (prefix.empty()) return warnings;
+  for (std::string& warning : warnings) {
+    for (size_t at; (at = warning.find(prefix)) != std::string::npos;) warning.erase(at, prefix.size());
   }
-  for (const LevelEntry& entry : manifest->levels) {
-    const auto file = LevelFile::open(out / entry.file, LevelCheck::Full);
-    // The check has read the whole file already, so that the hash costs next to nothing. It tells a sound file of
-    // another bake.
-    if (!file || (*file)->file_bytes() != entry.file_bytes) return std::nullopt;
-    if (hash_bytes((*file)->bytes()) != entry.file_hash) return std::nullopt;
-  }
-  return std::move(*manifest);
+  return warnings;
 }
 
 /// Where vertices and faces of one surface are in another.
@@ -374,22 +389,35 @@ class Baker {
 
 }  // namespace
 
+std::optional<Manifest> find_up_to_date(const fs::path& source, const fs::path& out, const BakeOptions& options) {
+  auto manifest = read_manifest(out);
+  if (!manifest || !manifest->source_files) return std::nullopt;
+  const auto source_hash = hash_source(source, *manifest->source_files, options.import);
+  if (!source_hash) return std::nullopt;
+  const Manifest wanted = make_manifest(source.filename().string(), *source_hash, options);
+  if (!are_same_bake(*manifest, wanted) || !is_whole(out, *manifest)) return std::nullopt;
+  return std::move(*manifest);
+}
+
 Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeOptions& options) {
   FARFIELD_TRY(check_options(options));
-  // What is no asset cannot be up to date: refused before the import, which may take minutes. An asset with other
-  // files in it may be; then they do no harm.
-  if (auto checked = check_replaceable(out); !checked && !read_manifest(out)) {
-    return tl::unexpected<Error>(checked.error());
-  }
   const Stopwatch watch;
+  if (auto manifest = find_up_to_date(source, out, options)) {
+    BakeReport report;
+    report.warnings = manifest->warnings;
+    report.manifest = std::move(*manifest);
+    report.up_to_date = true;
+    report.total_seconds = watch.seconds();
+    return report;
+  }
+  FARFIELD_TRY(check_replaceable(out));  // before the import, which may take minutes
   options.job.report(0, "import");
   FARFIELD_TRY_LET(auto asset, import_asset(source, options.import));
+  asset.warnings = without_folder(std::move(asset.warnings), source.parent_path());
   const double import_seconds = watch.seconds();
-  auto report = bake(std::move(asset), source.filename().string(), out, options);
-  if (report) {
-    report->import_seconds = import_seconds;
-    report->total_seconds += import_seconds;
-  }
+  FARFIELD_TRY_LET(auto report, bake(std::move(asset), source.filename().string(), out, options));
+  report.import_seconds = import_seconds;
+  report.total_seconds += import_seconds;
   return report;
 }
 
@@ -398,20 +426,20 @@ Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, con
   FARFIELD_TRY(check_options(options));
   const Stopwatch watch;
   BakeReport report;
-  report.warnings = std::move(asset.warnings);
-  report.manifest.generator = "farfield " FARFIELD_VERSION;
-  report.manifest.source = source_name;
-  report.manifest.source_hash = asset.source_hash;
-  report.manifest.options = canonical_options(options);
-  if (auto manifest = find_up_to_date(out, report.manifest)) {
+  report.warnings = asset.warnings;
+  report.manifest = make_manifest(source_name, asset.source_hash, options);
+  report.manifest.source_files = std::move(asset.source_files);
+  report.manifest.warnings = std::move(asset.warnings);
+  if (auto manifest = read_manifest(out);
+      manifest && are_same_bake(*manifest, report.manifest) && is_whole(out, *manifest)) {
     report.manifest = std::move(*manifest);
     report.up_to_date = true;
     report.total_seconds = watch.seconds();
     return report;
   }
   FARFIELD_TRY_LET(auto workspace, BakeWorkspace::open(out));
-  auto baked = Baker(options, std::move(asset.surface), std::move(workspace), std::move(report)).run();
-  if (baked) baked->total_seconds = watch.seconds();
+  FARFIELD_TRY_LET(auto baked, Baker(options, std::move(asset.surface), std::move(workspace), std::move(report)).run());
+  baked.total_seconds = watch.seconds();
   return baked;
 }
 

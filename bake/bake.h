@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -50,6 +51,11 @@ struct BakeReport {
   double import_seconds = 0, total_seconds = 0;
   bool up_to_date = false;  ///< the folder already held exactly this bake; nothing was done
 };
+
+/// The manifest of the asset in `out`, if it is whole and just what bake(source, out, options) would make. Reads and
+/// hashes the files, without looking at what they mean; nothing if that is not enough to tell.
+std::optional<Manifest> find_up_to_date(const std::filesystem::path& source, const std::filesystem::path& out,
+                                        const BakeOptions& options);
 
 /// Bakes `source` into the folder `out` (created; conventionally NAME.farfield). Same source and options give the same
 /// bytes for any thread count. Interrupted bakes resume: finished levels are found by hash and kept; the manifest is

@@ -17,6 +17,13 @@ uint64_t hash_values(std::span<const T> values, uint64_t seed = 0) {
   return hash_bytes(std::as_bytes(values), seed);
 }
 
+/// A file by name and content.
+struct HashedFile {
+  std::string path;
+  uint64_t hash = 0;  ///< of its bytes, unpacked if it is gzipped; 0: it was not there
+  friend bool operator==(const HashedFile&, const HashedFile&) = default;
+};
+
 /// 16 lower-case hexadecimal digits, as manifests write hashes.
 std::string to_hex(uint64_t value);
 

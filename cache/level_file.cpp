@@ -95,7 +95,7 @@ LevelFileSizes level_file_sizes(const LevelView& level) {
   return {layout.file_bytes, round_up(layout.file_bytes, kPageBytes), build_only};
 }
 
-Result<std::unique_ptr<LevelFile>> LevelFile::open(const std::filesystem::path& path, LevelCheck check) {
+Result<std::unique_ptr<LevelFile>> LevelFile::map(const std::filesystem::path& path) {
   FARFIELD_TRY_LET(const auto file, open_regular_file(path));
   if (file.bytes == 0) {
     return make_error(ErrorCode::BadFile,
@@ -108,8 +108,25 @@ Result<std::unique_ptr<LevelFile>> LevelFile::open(const std::filesystem::path& 
   std::unique_ptr<LevelFile> level(new LevelFile);  // owns the map from here on
   level->map_ = static_cast<const std::byte*>(map);
   level->map_bytes_ = file.bytes;
-  FARFIELD_TRY_LET(auto view, parse_level({level->map_, level->map_bytes_}, check, path.string()));
-  level->view_ = view;
+  return level;
+}
+
+Result<std::unique_ptr<LevelFile>> LevelFile::open(const std::filesystem::path& path, LevelCheck check) {
+  FARFIELD_TRY_LET(auto level, map(path));
+  FARFIELD_TRY_LET(level->view_, parse_level(level->bytes(), check, path.string()));
+  return level;
+}
+
+Result<std::unique_ptr<LevelFile>> LevelFile::open_known(const std::filesystem::path& path, uint64_t file_hash) {
+  FARFIELD_TRY_LET(auto level, map(path));
+  if (hash_bytes(level->bytes()) != file_hash) {
+    // Not what the manifest means: damaged, which the checksums say better, or a sound file of another bake.
+    FARFIELD_TRY(parse_level(level->bytes(), LevelCheck::Full, path.string()));
+    return make_error(ErrorCode::BadFile, fmt::format("{} is not the file that its manifest meant when the asset was "
+                                                      "opened; open it again, or bake it again",
+                                                      path.string()));
+  }
+  FARFIELD_TRY_LET(level->view_, parse_level(level->bytes(), LevelCheck::Values, path.string()));
   return level;
 }
 

@@ -28,7 +28,8 @@ LevelFileSizes level_file_sizes(const LevelView& level);
 /// How much of a level file open() proves before it trusts it.
 enum class LevelCheck {
   Structure,  ///< header, section table, sizes, brick and quad indices: enough that no read leaves the file
-  Full,       ///< and every section's checksum and the values (finite positions, densities, monotone prefixes)
+  Values,     ///< and the values (finite positions, densities, monotone prefixes): for bytes whose hash is known
+  Full,       ///< and every section's checksum
 };
 
 /// A level file mapped read-only. Immutable; any thread may read it. The file must not be changed while mapped.
@@ -36,6 +37,9 @@ class LevelFile {
  public:
   /// Maps and checks a level file. Errors: NotFound, Io, BadFile (with offset and what was expected).
   static Result<std::unique_ptr<LevelFile>> open(const std::filesystem::path& path, LevelCheck check);
+  /// Maps and checks the file that a manifest means. All its bytes are read for their hash, once: that stands for the
+  /// sections' checksums. Errors: those of open(); BadFile if it is another file.
+  static Result<std::unique_ptr<LevelFile>> open_known(const std::filesystem::path& path, uint64_t file_hash);
   ~LevelFile();
   LevelFile(const LevelFile&) = delete;
   LevelFile& operator=(const LevelFile&) = delete;
@@ -52,6 +56,7 @@ class LevelFile {
 
  private:
   LevelFile() = default;
+  static Result<std::unique_ptr<LevelFile>> map(const std::filesystem::path& path);
   const std::byte* map_ = nullptr;  ///< file_bytes() long; owned
   uint64_t map_bytes_ = 0;
   LevelView view_;

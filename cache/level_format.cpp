@@ -58,7 +58,9 @@ class Parser {
     if (auto error = map_sections()) return *error;
     if (auto problem = find_structure_problem(view_)) return broken(*problem);
     if (check == LevelCheck::Structure) return view_;
-    if (auto error = check_bytes()) return *error;
+    if (check == LevelCheck::Full) {
+      if (auto error = check_bytes()) return *error;
+    }
     if (auto problem = find_value_problem(view_)) return broken(*problem);
     return view_;
   }

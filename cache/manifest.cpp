@@ -27,6 +27,8 @@ constexpr size_t kMaxLevels = 64;  // each level halves the resolution: no doubl
 constexpr size_t kMaxHullPoints = 1 << 13;
 constexpr uint64_t kMaxBytes = uint64_t{1} << 50;
 constexpr uint64_t kMaxElements = uint64_t{1} << 32;
+constexpr size_t kMaxSourceFiles = 1 << 13;
+constexpr size_t kMaxWarnings = 64;
 constexpr int kMaxDepth = 16;  // of nesting; ours is 4
 
 // ---- what must hold, for reading and for writing ----
@@ -81,6 +83,10 @@ Problem find_problem(const Manifest& manifest) {
   }
   if (manifest.hull.size() > kMaxHullPoints) return fmt::format("the hull has more than {} points", kMaxHullPoints);
   if (!std::ranges::all_of(manifest.hull, is_finite)) return "a hull point is not finite";
+  if (manifest.source_files && manifest.source_files->size() > kMaxSourceFiles) {
+    return fmt::format("there are more than {} source files", kMaxSourceFiles);
+  }
+  if (manifest.warnings.size() > kMaxWarnings) return fmt::format("there are more than {} warnings", kMaxWarnings);
   if (manifest.levels.empty()) return "there are no levels";
   if (manifest.levels.size() > kMaxLevels) {
     return fmt::format("there are {} levels, and at most {} are possible", manifest.levels.size(), kMaxLevels);
@@ -136,8 +142,11 @@ class FieldReader {
   std::string text(const Json& object, const char* key, const std::string& where = "") {
     const Json* value = field(object, key, where);
     if (value == nullptr) return {};
-    if (!value->is_string()) return fail(join(where, key), "a text"), std::string();
-    return value->get<std::string>();
+    return text(*value, join(where, key));
+  }
+  std::string text(const Json& value, const std::string& where) {
+    if (!value.is_string()) return fail(where, "a text"), std::string();
+    return value.get<std::string>();
   }
   uint64_t count(const Json& object, const char* key, const std::string& where = "") {
     const Json* value = field(object, key, where);
@@ -222,11 +231,31 @@ LevelEntry level_from_json(const Json& json, const std::string& where, FieldRead
   return level;
 }
 
+std::vector<HashedFile> files_from_json(const Json& json, FieldReader& read) {
+  std::vector<HashedFile> files;
+  for (const Json& file : read.array(json, "source_files")) {
+    if (read.problem || files.size() > kMaxSourceFiles) break;
+    const std::string where = fmt::format("source_files[{}]", files.size());
+    files.push_back({read.text(file, "file", where), read.hash(file, "hash", where)});
+  }
+  return files;
+}
+
+std::vector<std::string> warnings_from_json(const Json& json, FieldReader& read) {
+  std::vector<std::string> warnings;
+  for (const Json& warning : read.array(json, "warnings")) {
+    if (read.problem || warnings.size() > kMaxWarnings) break;
+    warnings.push_back(read.text(warning, fmt::format("warnings[{}]", warnings.size())));
+  }
+  return warnings;
+}
+
 Manifest manifest_from_json(const Json& json, FieldReader& read) {
   Manifest manifest;
   manifest.generator = read.text(json, "generator");
   manifest.source = read.text(json, "source");
   manifest.source_hash = read.hash(json, "source_hash");
+  if (json.is_object() && json.contains("source_files")) manifest.source_files = files_from_json(json, read);
   manifest.options = read.text(json, "options");
   manifest.origin = read.point(json, "origin");
   manifest.bounds.lower = vec3(read.point(json, "bounds_lower"));
@@ -236,6 +265,7 @@ Manifest manifest_from_json(const Json& json, FieldReader& read) {
     if (read.problem || manifest.hull.size() > kMaxHullPoints) break;
     manifest.hull.push_back(vec3(read.point(point, fmt::format("hull[{}]", manifest.hull.size()))));
   }
+  if (json.is_object() && json.contains("warnings")) manifest.warnings = warnings_from_json(json, read);
   const Json& levels = read.array(json, "levels");
   if (levels.size() > kMaxLevels) {
     read.problem = fmt::format("there are {} levels, and at most {} are possible", levels.size(), kMaxLevels);
@@ -249,6 +279,12 @@ Manifest manifest_from_json(const Json& json, FieldReader& read) {
 // ---- values to JSON ----
 
 OrderedJson to_json(const dvec3& point) { return OrderedJson::array({point.x, point.y, point.z}); }
+
+OrderedJson to_json(const std::vector<HashedFile>& files) {
+  OrderedJson json = OrderedJson::array();
+  for (const HashedFile& file : files) json.push_back({{"file", file.path}, {"hash", to_hex(file.hash)}});
+  return json;
+}
 
 OrderedJson to_json(const LevelEntry& level) {
   OrderedJson json = {{"level", level.level},
@@ -277,17 +313,19 @@ std::string manifest_to_json(const Manifest& manifest) {
   for (const vec3& point : manifest.hull) hull.push_back(to_json(dvec3(point)));
   OrderedJson levels = OrderedJson::array();
   for (const LevelEntry& level : manifest.levels) levels.push_back(to_json(level));
-  const OrderedJson json = {{"version", manifest.version},
-                            {"generator", manifest.generator},
-                            {"source", manifest.source},
-                            {"source_hash", to_hex(manifest.source_hash)},
-                            {"options", manifest.options},
-                            {"origin", to_json(manifest.origin)},
-                            {"bounds_lower", to_json(dvec3(manifest.bounds.lower))},
-                            {"bounds_upper", to_json(dvec3(manifest.bounds.upper))},
-                            {"base_resolution", manifest.base_resolution},
-                            {"levels", std::move(levels)},
-                            {"hull", std::move(hull)}};
+  OrderedJson json = {{"version", manifest.version},
+                      {"generator", manifest.generator},
+                      {"source", manifest.source},
+                      {"source_hash", to_hex(manifest.source_hash)},
+                      {"options", manifest.options},
+                      {"origin", to_json(manifest.origin)},
+                      {"bounds_lower", to_json(dvec3(manifest.bounds.lower))},
+                      {"bounds_upper", to_json(dvec3(manifest.bounds.upper))},
+                      {"base_resolution", manifest.base_resolution},
+                      {"levels", std::move(levels)},
+                      {"hull", std::move(hull)}};
+  if (manifest.source_files) json["source_files"] = to_json(*manifest.source_files);
+  if (!manifest.warnings.empty()) json["warnings"] = manifest.warnings;
   // `replace`: a source's file name need not be UTF-8, JSON must be.
   return json.dump(2, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
 }

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/hash.h"
 #include "base/result.h"
 #include "base/vec.h"
 
@@ -44,9 +45,12 @@ struct LevelEntry {
 /// is not written, so numbers may have gaps; the last one is the root.
 struct Manifest {
   int version = kFormatVersion;
-  std::string generator;       ///< "farfield 0.1.0"
-  std::string source;          ///< file name (no folders) of the source
-  uint64_t source_hash = 0;    ///< XXH3 of the source's bytes and of the files it refers to
+  std::string generator;     ///< "farfield 0.1.0"
+  std::string source;        ///< file name (no folders) of the source
+  uint64_t source_hash = 0;  ///< XXH3 of the source's bytes and of the files it refers to
+  /// Those files, relative to the source's folder; absent in manifests of earlier versions.
+  std::optional<std::vector<HashedFile>> source_files;
+  std::vector<std::string> warnings;  ///< what the import dropped, missed or ignored, one line each
   std::string options;         ///< canonical text of the bake options, so that equal text and hash mean equal bytes
   dvec3 origin{0.0};           ///< positions are relative to this point of the source's space
   Box3 bounds;                 ///< of all levels, relative to origin

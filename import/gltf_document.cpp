@@ -32,14 +32,21 @@ constexpr std::string_view kKnownExtensions[] = {"KHR_lights_punctual",
 /// File access for tinygltf: only regular files in or relative to the document's folder, with our size limit, hashed.
 struct FileAccess {
   std::string folder;
-  uint64_t hash = 0;
+  std::vector<HashedFile> files;
+
+  void note(const std::string& path, uint64_t hash) {
+    files.push_back({fs::path(path).lexically_relative(folder).generic_string(), hash});
+  }
 };
 
 bool file_exists(const std::string& path, void* user) {
   // tinygltf also looks into the working directory ("./NAME"); what a file means must not depend on that.
-  const auto& access = *static_cast<FileAccess*>(user);
+  auto& access = *static_cast<FileAccess*>(user);
+  if (!path.starts_with(access.folder)) return false;
   std::error_code failure;
-  return path.starts_with(access.folder) && fs::is_regular_file(path, failure);
+  const bool exists = fs::is_regular_file(path, failure);
+  if (!exists) access.note(path, 0);
+  return exists;
 }
 
 bool read_whole_file(std::vector<unsigned char>* out, std::string* error, const std::string& path, void* user) {
@@ -49,7 +56,7 @@ bool read_whole_file(std::vector<unsigned char>* out, std::string* error, const 
     return false;
   }
   auto& access = *static_cast<FileAccess*>(user);
-  access.hash = mix64(access.hash, hash_values<unsigned char>(*bytes));
+  access.note(path, hash_values<unsigned char>(*bytes));
   *out = std::move(*bytes);
   return true;
 }
@@ -303,7 +310,7 @@ Result<GltfDocument> open_gltf(std::span<const unsigned char> bytes, const fs::p
   }
 
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  FileAccess access{(fs::absolute(folder) / "").string(), 0};
+  FileAccess access{(fs::absolute(folder) / "").string(), {}};
   tinygltf::TinyGLTF loader;
   loader.SetImageLoader(keep_encoded, nullptr);
   loader.SetFsCallbacks({file_exists, tinygltf::ExpandFilePath, read_whole_file, nullptr, &access});
@@ -325,7 +332,7 @@ Result<GltfDocument> open_gltf(std::span<const unsigned char> bytes, const fs::p
                       fmt::format("{}: requires {}, which is not supported; export without it", document.name, names));
   }
   if (!ok) return document.bad(first_line(error));
-  document.dependency_hash = access.hash;
+  document.files = std::move(access.files);
 
   for (const auto check : {check_meshes, check_textures, check_nodes}) {
     if (auto good = check(document); !good) return tl::unexpected(good.error());

@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 
+#include "base/hash.h"
 #include "base/result.h"
 #include "base/vec.h"
 
@@ -18,7 +19,7 @@ struct GltfDocument {
   std::string name;  ///< the file's path, for messages
   tinygltf::Model model;
   std::vector<std::string> warnings;
-  uint64_t dependency_hash = 0;  ///< of the buffers and images in files of their own
+  std::vector<HashedFile> files;  ///< the buffers and images in files of their own
 
   tl::unexpected<Error> bad(const std::string& what) const;
 };

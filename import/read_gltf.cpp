@@ -246,7 +246,7 @@ class GltfMeshReader {
 
   Result<SourceMesh> read(int mesh) {
     mesh_.warnings = document_.warnings;
-    mesh_.dependency_hash = document_.dependency_hash;
+    mesh_.source_files = document_.files;
     FARFIELD_TRY(mesh >= 0 ? read_one(mesh) : read_scene());
     if (!mesh_.corner_uv.empty()) mesh_.corner_uv.resize(mesh_.corner_count(), no_uv());
     if (!mesh_.corner_color.empty()) mesh_.corner_color.resize(mesh_.corner_count(), vec4(1.0f));

@@ -59,11 +59,19 @@ class MaterialLibraries {
     return text;
   }
 
-  bool load_file(const fs::path& path) {
+  /// The file is part of the source, whether it is there or not.
+  Result<std::vector<unsigned char>> read_noted_file(const fs::path& path) {
     auto bytes = read_file(path);
-    if (!bytes) bytes = read_file(path.string() + ".gz");
+    const fs::path relative = path.lexically_relative(folder_);
+    mesh_.source_files.push_back(
+        {(relative.empty() ? path : relative).generic_string(), bytes ? hash_values<unsigned char>(*bytes) : 0});
+    return bytes;
+  }
+
+  bool load_file(const fs::path& path) {
+    auto bytes = read_noted_file(path);
+    if (!bytes) bytes = read_noted_file(path.string() + ".gz");
     if (!bytes) return false;
-    mesh_.dependency_hash = mix64(mesh_.dependency_hash, hash_values<unsigned char>(*bytes));
     const std::string text(bytes->begin(), bytes->end());
     std::istringstream stream(text);
     std::map<std::string, int> names;
@@ -140,11 +148,10 @@ class MaterialLibraries {
     if (found != images_.end()) {
       out.image = found->second;
     } else {
+      (void)read_noted_file(path);
       auto image = read_texture(path, use);
       if (image) {
         out.image = std::make_shared<const Texture>(std::move(*image));
-        const auto bytes = read_file(path);
-        if (bytes) mesh_.dependency_hash = mix64(mesh_.dependency_hash, hash_values<unsigned char>(*bytes));
       } else {
         warn(fmt::format("texture: {}; the plain colour is used", image.error().message));
       }

@@ -52,14 +52,32 @@ Result<SourceMesh> read_as_named(const Bytes& bytes, const fs::path& path, const
       fmt::format("{}: unknown kind of file; OBJ, PLY, glTF and glb are read, also gzipped", path.string()));
 }
 
+/// Files that are not there do not count.
+uint64_t combine(uint64_t main_file, const std::vector<HashedFile>& files, const ImportOptions& options) {
+  uint64_t others = 0;
+  for (const HashedFile& file : files) {
+    if (file.hash != 0) others = mix64(others, file.hash);
+  }
+  return mix64(mix64(main_file, others), static_cast<uint64_t>(options.mesh));
+}
+
 }  // namespace
 
 Result<SourceMesh> read_source(const fs::path& path, const ImportOptions& options) {
   FARFIELD_TRY_LET(const auto bytes, read_file(path));
   FARFIELD_TRY_LET(auto mesh, read_as_named(bytes, path, options));
-  const uint64_t contents = mix64(hash_values<unsigned char>(bytes), mesh.dependency_hash);
-  mesh.source_hash = mix64(contents, static_cast<uint64_t>(options.mesh));
+  mesh.source_hash = combine(hash_values<unsigned char>(bytes), mesh.source_files, options);
   return mesh;
+}
+
+Result<uint64_t> hash_source(const fs::path& path, const std::vector<HashedFile>& files, const ImportOptions& options) {
+  FARFIELD_TRY_LET(const auto main_file, read_file(path));
+  std::vector<HashedFile> now = files;
+  for (HashedFile& file : now) {
+    const auto bytes = read_file(path.parent_path() / file.path);
+    file.hash = bytes ? hash_values<unsigned char>(*bytes) : 0;
+  }
+  return combine(hash_values<unsigned char>(main_file), now, options);
 }
 
 }  // namespace farfield

@@ -19,4 +19,10 @@ struct ImportOptions {
 /// remedy. Never crashes on bad files.
 Result<SourceMesh> read_source(const std::filesystem::path& path, const ImportOptions& options = {});
 
+/// The source_hash that read_source() would give a source that still refers to `files`: of the bytes of the main file
+/// and of those, and of the options. Hashes without looking at what the bytes mean. Errors: those of reading the main
+/// file; the others may be missing.
+Result<uint64_t> hash_source(const std::filesystem::path& path, const std::vector<HashedFile>& files,
+                             const ImportOptions& options);
+
 }  // namespace farfield

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/hash.h"
 #include "base/result.h"
 #include "base/vec.h"
 #include "import/texture.h"
@@ -49,9 +50,9 @@ struct SourceMesh {
   std::vector<vec4> corner_color;         ///< empty, or one per corner; linear RGBA
   std::vector<uint32_t> face_material;    ///< index into materials
   std::vector<SourceMaterial> materials;
-  std::vector<std::string> warnings;  ///< one line each
-  uint64_t dependency_hash = 0;       ///< of the contents of all files that the main file refers to
-  uint64_t source_hash = 0;           ///< of these, of the main file's and of ImportOptions; set by read_source()
+  std::vector<std::string> warnings;     ///< one line each
+  std::vector<HashedFile> source_files;  ///< that the main file refers to, relative to its folder, in order of use
+  uint64_t source_hash = 0;              ///< see hash_source(); set by read_source()
 
   size_t face_count() const { return face_material.size(); }
   size_t corner_count() const { return corner_position.size(); }

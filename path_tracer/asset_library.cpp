@@ -15,6 +15,7 @@
 #include <system_error>
 #include <thread>
 
+#include "bake/bake.h"
 #include "base/parallel.h"
 #include "base/result.h"
 #include "cache/manifest.h"
@@ -93,7 +94,24 @@ std::vector<std::string> bake_command(const RenderOptions& options, size_t mesh,
   return command;
 }
 
-// The bake itself finds out whether the folder is up to date, and then does nothing.
+BakeOptions bake_options(const RenderOptions& options, size_t mesh) {
+  BakeOptions bake;
+  bake.finest_grid = options.finest_grid;
+  bake.source_only = options.full_detail;
+  bake.import.mesh = static_cast<int>(mesh);
+  return bake;
+}
+
+// Says again what the bake said, since it is as true of this picture. True if there is nothing to bake.
+bool is_up_to_date(const RenderOptions& options, size_t mesh, const fs::path& folder) {
+  const auto manifest = find_up_to_date(options.scene, folder, bake_options(options, mesh));
+  if (manifest && options.warning) {
+    for (const std::string& warning : manifest->warnings)
+      options.warning(fmt::format("{}: {}", folder.filename().string(), warning));
+  }
+  return manifest.has_value();
+}
+
 Result<void> bake_mesh(const GltfScene& scene, const RenderOptions& options, size_t mesh, const fs::path& folder) {
   FARFIELD_TRY_LET(const auto child, start(bake_command(options, mesh, folder)));
   FARFIELD_TRY_LET(const auto status, wait_for(child, options));
@@ -134,7 +152,8 @@ Result<std::vector<fs::path>> find_or_bake_assets(const GltfScene& scene, const 
     if (!in_use[mesh]) continue;
     const char* suffix = options.full_detail ? ".source.farfield" : ".farfield";
     folders[mesh] = library / (scene.meshes[mesh].asset_name + suffix);
-    if (auto baked = bake_mesh(scene, options, mesh, folders[mesh]); !baked) return tl::unexpected(baked.error());
+    if (is_up_to_date(options, mesh, folders[mesh])) continue;
+    FARFIELD_TRY(bake_mesh(scene, options, mesh, folders[mesh]));
   }
   return folders;
 }

@@ -79,10 +79,9 @@ bool same_places(std::span<const GltfInstance> a, std::span<const GltfInstance> 
 }
 
 void report_problems(const RenderOptions& options, const FrameReport& frame) {
-  if (!options.message) return;
-  if (frame.invalid_samples > 0)
-    options.message(
-        fmt::format("warning: frame {}: {} paths were not finite and are black", frame.frame, frame.invalid_samples));
+  if (options.warning && frame.invalid_samples > 0)
+    options.warning(
+        fmt::format("frame {}: {} paths were not finite and are black", frame.frame, frame.invalid_samples));
 }
 
 }  // namespace
@@ -97,8 +96,8 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOption
   FARFIELD_TRY_LET(auto scene, read_gltf_scene(options.scene));
   std::vector<std::string> warnings = scene.warnings;
   FARFIELD_TRY_LET(auto lights, make_lights(scene, options, warnings));
-  if (options.message)
-    for (const std::string& warning : warnings) options.message("warning: " + warning);
+  if (options.warning)
+    for (const std::string& warning : warnings) options.warning(warning);
 
   FARFIELD_TRY_LET(auto folders, find_or_bake_assets(scene, options));
   for (size_t mesh = 0; mesh < folders.size(); ++mesh)

@@ -33,7 +33,8 @@ struct RenderOptions {
   uint32_t finest_grid = 512;         ///< of assets that have to be baked first
   /// Command that bakes: called as BAKER bake SCENE -o DIR --mesh N ... Empty: this very program.
   std::filesystem::path baker;
-  std::function<void(const std::string& line)> message;  ///< for a person, one line each; from any thread. May be empty
+  std::function<void(const std::string& line)> message;  ///< for a person who waits, one line each; may be empty
+  std::function<void(const std::string& line)> warning;  ///< what is ignored, guessed or degraded; may be empty
   Job job;                                               ///< reports from any thread
 };
 

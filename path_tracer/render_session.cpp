@@ -16,8 +16,10 @@ RuntimeOptions runtime_options(const RenderOptions& options) {
   runtime.blend = options.blend;
   runtime.lod_scale = options.lod_scale;
   if (options.full_detail) runtime.forced_lambda = 0.0f;
-  runtime.messages = [message = options.message](Severity severity, const std::string& text) {
-    if (message) message(severity == Severity::Info ? text : "warning: " + text);
+  runtime.messages = [message = options.message, warning = options.warning](Severity severity,
+                                                                            const std::string& text) {
+    const auto& sink = severity == Severity::Info ? message : warning;
+    if (sink) sink(text);
   };
   return runtime;
 }

@@ -369,6 +369,7 @@ Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name) {
     return make_error(ErrorCode::BadFile, fmt::format("{}: no face has any area", name));
   }
   asset.source_hash = mesh.source_hash;
+  asset.source_files = std::move(mesh.source_files);
   asset.warnings = limit(std::move(mesh.warnings));
   return asset;
 }

@@ -15,8 +15,9 @@ namespace farfield {
 
 struct ImportedAsset {
   Surface surface;
-  uint64_t source_hash = 0;           ///< of the file's bytes, of the files it refers to, and of ImportOptions
-  std::vector<std::string> warnings;  ///< one line each: dropped faces, missing textures, ignored features
+  uint64_t source_hash = 0;              ///< of the file's bytes, of the files it refers to, and of ImportOptions
+  std::vector<HashedFile> source_files;  ///< that it refers to, relative to its folder
+  std::vector<std::string> warnings;     ///< one line each: dropped faces, missing textures, ignored features
 };
 
 /// Polygons are triangulated (quads along the diagonal that lies inside, the shorter of two; concave ones correctly),

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <system_error>
 
-#include "base/hash.h"
 #include "base/result.h"
 #include "cache/level_file.h"
 #include "cache/manifest.h"
@@ -70,13 +69,7 @@ Result<void> check_header(const LevelHeader& header, const OpenAsset& asset, uin
 Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::filesystem::path& path,
                               BvhDevice& device) {
   auto loaded = std::make_unique<LoadedLevel>();
-  FARFIELD_TRY_LET(auto file, LevelFile::open(path, LevelCheck::Full));
-  loaded->file = std::move(file);
-  if (hash_bytes(loaded->file->bytes()) != asset.file_hashes[slot]) {
-    return make_error(ErrorCode::BadFile, fmt::format("{} is not the file that its manifest meant when the asset was "
-                                                      "opened; open it again, or bake it again",
-                                                      path.string()));
-  }
+  FARFIELD_TRY_LET(loaded->file, LevelFile::open_known(path, asset.file_hashes[slot]));
   const LevelView& view = loaded->file->view();
   FARFIELD_TRY(check_header(view.header, asset, slot, path));
   FARFIELD_TRY_LET(auto traced, TracedLevel::build(device, view, slot));

@@ -87,6 +87,10 @@ Result<RenderReport> run_with_progress(RenderArguments& arguments,
     progress.clear();
     fmt::print("{}\n", one_line(line));
   };
+  options.warning = [&](const std::string& line) {
+    progress.clear();
+    print_warnings("render", {line});
+  };
   return job(options);
 }
 

@@ -336,6 +336,55 @@ TEST_F(Bake, BakesAnewWhenSourceOptionsOrFilesHaveChanged) {
   EXPECT_FALSE(fs::exists(partial()));
 }
 
+/// An OBJ file with a material and a texture that is not there.
+void write_source(const fs::path& folder) {
+  fs::create_directories(folder);
+  std::ofstream(folder / "thing.obj") << "mtllib thing.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0.2\nvt 0 0\nusemtl m\n"
+                                         "f 1/1 2/1 3/1\nf 2/1 4/1 3/1\n";
+  std::ofstream(folder / "thing.mtl") << "newmtl m\nKd 0.5 0.5 0.5\nmap_Kd missing.png\n";
+}
+
+TEST_F(Bake, KnowsWithoutAnImportWhetherASourceIsUpToDate) {
+  const fs::path source = folder_ / "source" / "thing.obj";
+  write_source(source.parent_path());
+  EXPECT_FALSE(find_up_to_date(source, out(), small_options()));
+  ASSERT_TRUE(bake(source, out(), small_options()));
+  const auto manifest = find_up_to_date(source, out(), small_options());
+  ASSERT_TRUE(manifest);
+  EXPECT_EQ((*manifest->source_files)[0].path, "thing.mtl");
+  EXPECT_EQ((*manifest->source_files)[1], (HashedFile{"missing.png", 0}));
+
+  BakeOptions coarser = small_options();
+  coarser.finest_grid = 16;
+  EXPECT_FALSE(find_up_to_date(source, out(), coarser));
+
+  std::ofstream(source.parent_path() / "missing.png") << "now it is there";
+  EXPECT_FALSE(find_up_to_date(source, out(), small_options()));
+  fs::remove(source.parent_path() / "missing.png");
+  EXPECT_TRUE(find_up_to_date(source, out(), small_options()));
+
+  std::ofstream(source.parent_path() / "thing.mtl", std::ios::app) << "# edited\n";
+  EXPECT_FALSE(find_up_to_date(source, out(), small_options()));
+  write_source(source.parent_path());
+  std::ofstream(source, std::ios::app) << "# edited\n";
+  EXPECT_FALSE(find_up_to_date(source, out(), small_options()));
+}
+
+TEST_F(Bake, SaysItsWarningsAgainWhenUpToDateAndTheyDoNotNameTheFolder) {
+  for (const char* name : {"a", "b"}) {
+    const fs::path source = folder_ / name / "thing.obj";
+    write_source(source.parent_path());
+    const auto first = bake(source, folder_ / name / "out", small_options());
+    const auto again = bake(source, folder_ / name / "out", small_options());
+    ASSERT_TRUE(first && again);
+    EXPECT_TRUE(again->up_to_date);
+    EXPECT_EQ(again->warnings, first->warnings);
+    ASSERT_FALSE(first->warnings.empty());
+    EXPECT_NE(first->warnings[0].find("missing.png"), std::string::npos);
+  }
+  EXPECT_EQ(files_of(folder_ / "a" / "out"), files_of(folder_ / "b" / "out"));
+}
+
 TEST_F(Bake, BakesAnewWhenAFileIsOfAnotherBake) {
   ASSERT_TRUE(bake(two_triangles(), "thing", out(), small_options()).has_value());
   const auto before = files_of(out());

@@ -26,6 +26,8 @@ TEST(Manifest, GivesBackWhatWasWritten) {
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(manifest_to_json(*read), manifest_to_json(manifest));
   EXPECT_EQ(read->source_hash, manifest.source_hash);
+  EXPECT_EQ(read->source_files, manifest.source_files);
+  EXPECT_EQ(read->warnings, manifest.warnings);
   EXPECT_EQ(read->origin, manifest.origin);
   EXPECT_EQ(read->bounds.lower, manifest.bounds.lower);
   EXPECT_EQ(read->bounds.upper, manifest.bounds.upper);
@@ -47,6 +49,8 @@ TEST(Manifest, SourceNamesNeedNotBeUtf8) {
 TEST(Manifest, ExtremeValuesSurvive) {
   Manifest manifest = sample_manifest();
   manifest.source_hash = ~uint64_t{0};
+  manifest.source_files = std::vector<HashedFile>{{"a/b.mtl", 1}, {"../c \"d\".png", 0}};
+  manifest.warnings = {"one", "two\n"};
   manifest.origin = {1e300, -1e-300, 0.1};
   manifest.hull = {{1e-45f, 3.4e38f, 0.1f}};
   manifest.levels.resize(1);
@@ -55,6 +59,8 @@ TEST(Manifest, ExtremeValuesSurvive) {
   const Result<Manifest> read = manifest_from_json(manifest_to_json(manifest), "test");
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->source_hash, manifest.source_hash);
+  EXPECT_EQ(read->source_files, manifest.source_files);
+  EXPECT_EQ(read->warnings, manifest.warnings);
   EXPECT_EQ(read->origin, manifest.origin);
   EXPECT_EQ(read->hull, manifest.hull);
   EXPECT_EQ(read->levels[0].file_bytes, uint64_t{1} << 50);
@@ -211,6 +217,10 @@ TEST(HostileManifest, NumbersThatDoNotFitAreRefused) {
   expect_message(with("/source_hash", "81985529216486895"), "source_hash must be a text");
   expect_message(with("/levels/1/errors/color_error", "\"x\""), "levels[1].errors.color_error must be a number");
   expect_message(with("/levels/1/errors", "[]"), "levels[1].errors must be an object");
+  expect_message(with("/source_files", "3"), "source_files must be a list");
+  expect_message(with("/source_files", "[{\"file\": 1}]"), "source_files[0].file must be a text");
+  expect_message(with("/source_files", "[{\"file\": \"a\", \"hash\": \"1\"}]"), "source_files[0].hash must be a hash");
+  expect_message(with("/warnings", "[1]"), "warnings[0] must be a text");
   expect_message(with("/levels/1", "7"), "levels[1] must be an object");
   expect_message(with("/origin", "[1, 2]"), "origin must be three numbers");
   expect_message(with("/hull", "{}"), "hull must be a list");
