@@ -84,6 +84,8 @@ class MaterialReader {
     return found->second;
   }
   const UvSource& uv(uint32_t index) const { return uv_[index]; }
+  /// An error once an image was wanted and none can be read: no fault of the file, so no case for plain colours.
+  const Result<void>& ready() const { return ready_; }
 
  private:
   void warn(std::string text) { mesh_.warnings.push_back(std::move(text)); }
@@ -208,13 +210,16 @@ class MaterialReader {
 
   std::shared_ptr<const Texture> image(int index, TextureUse use) {
     const auto bytes = image_bytes(document_, index);
-    auto decoded = bytes ? decode_texture(*bytes, fmt::format("{}: image {}", document_.name, index), use)
-                         : tl::unexpected(bytes.error());
-    if (!decoded) {
-      warn(fmt::format("{}; the plain colour is used", decoded.error().message));
-      return nullptr;
-    }
-    return std::make_shared<const Texture>(std::move(*decoded));
+    if (!bytes) return without_image(bytes.error());
+    auto decoded = decode_texture(*bytes, fmt::format("{}: image {}", document_.name, index), use);
+    if (decoded) return std::make_shared<const Texture>(std::move(*decoded));
+    if (decoded.error().code == ErrorCode::Io) ready_ = tl::unexpected(decoded.error());
+    return without_image(decoded.error());
+  }
+
+  std::shared_ptr<const Texture> without_image(const Error& why) {
+    warn(fmt::format("{}; the plain colour is used", why.message));
+    return nullptr;
   }
 
   const GltfDocument& document_;
@@ -222,6 +227,7 @@ class MaterialReader {
   std::map<int, uint32_t> index_;
   std::vector<UvSource> uv_;  ///< per material of the mesh
   std::map<std::pair<int, TextureUse>, std::shared_ptr<const Texture>> images_;
+  Result<void> ready_;
 };
 
 /// The corner triples of a primitive, whatever its mode.
@@ -248,6 +254,7 @@ class GltfMeshReader {
     mesh_.warnings = document_.warnings;
     mesh_.source_files = document_.files;
     FARFIELD_TRY(mesh >= 0 ? read_one(mesh) : read_scene());
+    FARFIELD_TRY(materials_.ready());
     if (!mesh_.corner_uv.empty()) mesh_.corner_uv.resize(mesh_.corner_count(), no_uv());
     if (!mesh_.corner_color.empty()) mesh_.corner_color.resize(mesh_.corner_count(), vec4(1.0f));
     return std::move(mesh_);

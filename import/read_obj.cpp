@@ -50,6 +50,9 @@ class MaterialLibraries {
     return default_;
   }
 
+  /// An error once an image was wanted and none can be read: no fault of the file, so no case for plain colours.
+  const Result<void>& ready() const { return ready_; }
+
  private:
   void warn(std::string text) { mesh_.warnings.push_back(std::move(text)); }
 
@@ -153,6 +156,7 @@ class MaterialLibraries {
       if (image) {
         out.image = std::make_shared<const Texture>(std::move(*image));
       } else {
+        if (image.error().code == ErrorCode::Io) ready_ = tl::unexpected(image.error());
         warn(fmt::format("texture: {}; the plain colour is used", image.error().message));
       }
       images_.emplace(key, out.image);
@@ -169,6 +173,7 @@ class MaterialLibraries {
   std::map<std::string, uint32_t, std::less<>> by_name_;
   std::map<std::pair<std::string, TextureUse>, std::shared_ptr<const Texture>> images_;
   uint32_t default_ = kNone;
+  Result<void> ready_;
 };
 
 class ObjReader {
@@ -178,6 +183,7 @@ class ObjReader {
 
   Result<SourceMesh> read() {
     while (!text_.at_end()) read_line();
+    if (!materials_.ready()) return tl::unexpected(materials_.ready().error());
     if (mesh_.corner_count() > UINT32_MAX) {
       return make_error(ErrorCode::Unsupported, fmt::format("{}: more than 2^32 face corners", name_));
     }

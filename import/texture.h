@@ -50,10 +50,12 @@ class Texture {
   std::vector<Level> levels_;
 };
 
-/// Reads an image file in any format that OpenImageIO knows. Errors: NotFound, BadFile, Unsupported (too large).
+/// Reads an image file in any format that OpenImageIO knows. Errors: NotFound, BadFile, Unsupported (too large); Io
+/// when no image at all can be read, because the module that decodes them is missing (texture_module.h).
 Result<Texture> read_texture(const std::filesystem::path& path, TextureUse use);
 
-/// Reads an image file that lies in memory. `name` is for messages.
+/// Reads an image file that lies in memory: PNG, JPEG, WebP or EXR. `name` is for messages. Errors: BadFile,
+/// Unsupported; Io as read_texture.
 Result<Texture> decode_texture(std::span<const unsigned char> bytes, const std::string& name, TextureUse use);
 
 /// The sRGB transfer function, [0, 1] to linear [0, 1].

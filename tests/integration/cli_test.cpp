@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "tests/support/gltf_files.h"
+#include "tests/support/png_files.h"
 #include "tests/support/small_assets.h"
 #include "tests/support/subprocess.h"
 
@@ -209,6 +211,36 @@ TEST_F(BadInput, ABudgetThatCannotDoSaysWhatWould) {
   const ProcessOutput output = farfield({"render", path("scene.gltf"), "--size", "8x8", "--spp", "1", "--budget", "1K",
                                          "--finest-grid", "16", "--assets", path("assets"), "-o", path("a.exr")});
   expect_one_line_error(output, "budget");
+}
+
+/// A triangle whose base colour is an image.
+std::string textured_glb() {
+  const std::string points = raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), image = png(1, 1, {{255, 0, 0, 255}});
+  const Json json = {{"asset", {{"version", "2.0"}}},
+                     {"buffers", {{{"byteLength", points.size() + image.size()}}}},
+                     {"bufferViews",
+                      {{{"buffer", 0}, {"byteLength", points.size()}},
+                       {{"buffer", 0}, {"byteOffset", points.size()}, {"byteLength", image.size()}}}},
+                     {"accessors", {{{"bufferView", 0}, {"componentType", 5126}, {"count", 3}, {"type", "VEC3"}}}},
+                     {"images", {{{"bufferView", 1}, {"mimeType", "image/png"}}}},
+                     {"textures", {{{"source", 0}}}},
+                     {"materials", {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}}},
+                     {"meshes", {{{"primitives", {{{"attributes", {{"POSITION", 0}}}, {"material", 0}}}}}}}};
+  return glb(json.dump(), points + image);
+}
+
+TEST_F(BadInput, WithoutTheTextureModuleOnlyImagesCannotBeRead) {
+  write(path("textured.glb"), textured_glb());
+  const auto bake = [&](const std::string& source, const std::string& asset) {
+    return farfield({"bake", source, "-o", path(asset), "--finest-grid", "16"});
+  };
+  EXPECT_EQ(bake(path("textured.glb"), "with").exit_code, 0);
+  setenv("FARFIELD_MODULE_DIR", path("").c_str(), 1);
+  EXPECT_EQ(bake(bush, "plain").exit_code, 0);
+  const ProcessOutput textured = bake(path("textured.glb"), "without");
+  unsetenv("FARFIELD_MODULE_DIR");
+  expect_one_line_error(textured, path("farfield_textures.so"));
+  EXPECT_FALSE(fs::exists(path("without")));
 }
 
 /// One bake that several tests look at.
