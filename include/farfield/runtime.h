@@ -28,7 +28,7 @@
 
 namespace farfield {
 
-/// How two neighbouring levels are mixed (DESIGN, decision 3).
+/// How two neighbouring levels are mixed (docs/architecture.md, decision 3).
 enum class Blend : uint8_t {
   Dissolve,  ///< each path sees one of the two, picked by RayContext::path_seed
 };
