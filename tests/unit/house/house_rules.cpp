@@ -158,4 +158,33 @@ std::vector<std::string> find_unknown_citations(const SourceFile& file, std::str
   return problems;
 }
 
+std::vector<std::string> find_missing_paths(const SourceFile& file, const std::set<std::string>& paths) {
+  static const std::regex path(R"(`([a-z_]+/[a-z0-9_/.-]+\.(?:h|cpp|cmake|md|py|txt)))");
+  std::vector<std::string> problems;
+  for (std::sregex_iterator match(file.text.begin(), file.text.end(), path), end; match != end; ++match) {
+    const std::string named = (*match)[1];
+    const bool is_header = named.starts_with("farfield/");
+    if (!paths.contains(is_header ? "include/" + named : named)) problems.push_back(file.name + ": " + named);
+  }
+  return problems;
+}
+
+std::vector<std::string> find_unknown_sections(const SourceFile& file, const std::string& theory) {
+  static const std::regex citation(R"(docs/theory\.md, sections? (\d+)(?:\.(\d+))?(?: and (\d+)(?:\.(\d+))?)?)");
+  const auto has = [&](const std::string& section, const std::string& part) {
+    const size_t begin = theory.find("\n## " + section + ". ");
+    if (begin == std::string::npos) return false;
+    const std::string body = theory.substr(begin, theory.find("\n## ", begin + 1) - begin);
+    return part.empty() || body.find("\n**" + section + "." + part + " ") != std::string::npos ||
+           body.find("\n" + part + ". ") != std::string::npos;
+  };
+  const std::string text = join_lines(file.text);
+  std::vector<std::string> problems;
+  for (std::sregex_iterator match(text.begin(), text.end(), citation), end; match != end; ++match) {
+    const bool is_known = has((*match)[1], (*match)[2]) && (!(*match)[3].matched || has((*match)[3], (*match)[4]));
+    if (!is_known) problems.push_back(file.name + ": " + match->str());
+  }
+  return problems;
+}
+
 }  // namespace farfield::house

@@ -36,4 +36,12 @@ std::vector<std::string> find_doubled_types(const std::vector<SourceFile>& files
 /// "FILE: [KEY]" for each citation [Author Year] or [Author Year, place] whose **[Author Year]** is not in the list.
 std::vector<std::string> find_unknown_citations(const SourceFile& file, std::string_view references);
 
+/// "FILE: PATH" for each file of a room, of docs/ or of scripts/ that a text names in backticks, with its extension,
+/// and that is not among `paths`.
+std::vector<std::string> find_missing_paths(const SourceFile& file, const std::set<std::string>& paths);
+
+/// "FILE: section N" for each "docs/theory.md, section N" (or N.M) that the theory does not have: sections are headed
+/// "## N. ", parts begin with "**N.M " or are items "M. " of a section's list.
+std::vector<std::string> find_unknown_sections(const SourceFile& file, const std::string& theory);
+
 }  // namespace farfield::house

@@ -77,16 +77,38 @@ TEST(House, NoTypeNameIsDefinedTwice) {
          "behaviour: rename one, or put it into an unnamed namespace";
 }
 
-TEST(House, EveryCitationIsInTheReferences) {
-  const std::string references = read(kRepository / "docs/references.md");
+/// What people read: sources, scripts, documents. Not these tests, whose made-up texts break the rules.
+std::vector<SourceFile> all_texts() {
   std::vector<SourceFile> files = all_sources();
   std::ranges::move(files_in("scripts", {".py"}), std::back_inserter(files));
   std::ranges::move(files_in("docs", {".md"}), std::back_inserter(files));
+  for (const char* name : {"README.md", "CONTRIBUTING.md"}) files.push_back({name, read(kRepository / name)});
+  std::erase_if(files, [](const SourceFile& file) { return file.name.starts_with("tests/unit/house/"); });
+  return files;
+}
+
+TEST(House, EveryCitationIsInTheReferences) {
+  const std::string references = read(kRepository / "docs/references.md");
   Problems problems;
-  for (const SourceFile& file : files) {
-    if (!file.name.starts_with("tests/unit/house/")) append(problems, find_unknown_citations(file, references));
-  }
+  for (const SourceFile& file : all_texts()) append(problems, find_unknown_citations(file, references));
   EXPECT_EQ(list(problems), "") << "add them to docs/references.md";
+}
+
+TEST(House, DocumentsNameFilesAndSectionsThatExist) {
+  std::set<std::string> paths;
+  for (const auto& [room, unused] : documented_arrows()) {
+    for (const SourceFile& file : files_in(room, {".h", ".cpp", ".cmake", ".txt"})) paths.insert(file.name);
+  }
+  for (const char* folder : {"docs", "scripts"}) {
+    for (const SourceFile& file : files_in(folder, {".md", ".py", ".txt"})) paths.insert(file.name);
+  }
+  const std::string theory = read(kRepository / "docs/theory.md");
+  Problems problems;
+  for (const SourceFile& file : all_texts()) {
+    if (file.name.ends_with(".md")) append(problems, find_missing_paths(file, paths));
+    append(problems, find_unknown_sections(file, theory));
+  }
+  EXPECT_EQ(list(problems), "");
 }
 
 // ---- the rules ----
@@ -147,6 +169,19 @@ TEST(HouseRules, FindACitationWithoutEntry) {
       Problems{});
   EXPECT_EQ(find_unknown_citations({"a.h", "/// by [Steele, Lea and\n/// Flood 2014, 3], not x[N - 1000]"}, references),
             Problems{"a.h: [Steele, Lea and Flood 2014, 3]"});
+}
+
+TEST(HouseRules, FindPathsAndSectionsThatAreNot) {
+  const std::set<std::string> paths = {"bvh/a.h", "include/farfield/ray.h"};
+  EXPECT_EQ(find_missing_paths({"d.md", "`bvh/a.h` (`farfield/ray.h`), `host.cpp`, `bvh/b.h` [`cache/c.cpp`]"}, paths),
+            (Problems{"d.md: bvh/b.h", "d.md: cache/c.cpp"}));
+  const std::string theory = "# Theory\n\n## 1. Light\n\n**1.2 More.** x\n\n## 2. Numbers\n\n3. **Three**\n";
+  EXPECT_EQ(
+      find_unknown_sections({"a.h", "docs/theory.md, section 1, docs/theory.md,\n// sections 1.2 and 2.3)"}, theory),
+      Problems{});
+  EXPECT_EQ(find_unknown_sections({"a.h", "docs/theory.md, section 3; docs/theory.md, section 1.3"}, theory),
+            (Problems{"a.h: docs/theory.md, section 3", "a.h: docs/theory.md, section 1.3"}));
+  EXPECT_EQ(find_unknown_sections({"a.h", "docs/theory.md, sections 1 and 2.2"}, theory).size(), 1u);
 }
 
 }  // namespace
