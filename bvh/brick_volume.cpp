@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two nested DDAs [Amanatides & Woo 1987], over bricks and over the voxels of a brick, and exact free flight in the
+// Two nested DDAs [Amanatides and Woo 1987], over bricks and over the voxels of a brick, and exact free flight in the
 // piecewise constant medium that they enumerate.
 //
 // Densities (1 byte per voxel) are read for every voxel, the 6 bytes of a voxel's SGGX matrix only where they may
@@ -28,7 +28,8 @@ namespace farfield {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-// Six-byte matrices have eigenvalues up to 1 + 1/127 (formula notes 7.10), so sigma may reach its square root.
+// Six-byte matrices have eigenvalues up to 1 + 1/127 (docs/theory.md, section 10.10), so sigma may reach its square
+// root.
 constexpr float kSigmaBound = 1.00393f;
 
 /// Random numbers of one flight: a function of the seed and a counter.

@@ -9,8 +9,7 @@
 // * context->instID is left alone: Debian's Embree has one instance level and asserts on.
 // * occluded reports by tfar = -infinity.
 // * Debian's Embree has its assertions on: a ray with a NaN or a coordinate beyond 1.8e18 stops the process. Hosts see
-// to
-//   that in world space; what an extreme transform makes of a ray is checked here.
+//   to that in world space; what an extreme transform makes of a ray is checked here.
 #include "bvh/instance_geometry.h"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// All instances of all assets as one Embree user geometry: primitive = instance (DESIGN, decision 1).
+// All instances of all assets as one Embree user geometry: primitive = instance (docs/architecture.md, decision 1).
 #pragma once
 
 #include <embree3/rtcore.h>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which level a ray sees of an instance: a pure function of plan, instance and ray (DESIGN, decisions 4 and 7).
+// Which level a ray sees of an instance: a pure function of plan, instance and ray (docs/architecture.md, decisions
+// 4 and 7).
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Why these choices (quads, MEDIUM quality, default flags, shared buffers): docs/decisions and the measurements that
-// DESIGN, decision 2, quotes. COMPACT would halve the speed on foliage; Embree cannot load a saved BVH.
+// Why these choices (quads, MEDIUM quality, default flags, shared buffers): docs/architecture.md, decision 2, and
+// bvh_bench. COMPACT would halve the speed on foliage; Embree cannot load a saved BVH.
 #include "bvh/level_scene.h"
 
 #include <fmt/format.h>

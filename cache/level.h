@@ -41,7 +41,7 @@ inline constexpr int kBrickVoxels = kBrickSide * kBrickSide * kBrickSide;  ///< 
 inline constexpr uint32_t kNoBrick = 0xffffffffu;                          ///< brick table entry of an empty brick
 
 /// One stored brick. The density of voxel i (x fastest, then y, then z) is density[i] / 255 * density_scale, in 1 /
-/// scene unit: the attenuation coefficient rho_g of formula notes section 1 (lambda_max(S) = 1), so that sigma_t(w) =
+/// scene unit: the attenuation coefficient rho of docs/theory.md, section 1 (lambda_max(S) = 1), so that sigma_t(w) =
 /// rho sqrt(w^T S w) and density_scale bounds sigma_t in the brick. Non-zero densities never round to 0. The payload of
 /// voxel i, when its density is not 0, is at payload_base + (number of non-zero densities before i) = payload_base +
 /// rank(i).

@@ -18,7 +18,7 @@ namespace farfield {
 inline constexpr int kFormatVersion = 1;
 inline constexpr const char* kManifestName = "manifest.json";
 
-/// Errors of a level as DESIGN defines them, signed fractions; absent until `farfield evaluate` has run.
+/// Errors of a level as docs/error_metric.md defines them, signed fractions; absent until `farfield evaluate` has run.
 struct LevelErrors {
   double occlusion_error = 0;
   double occlusion_rms = 0;

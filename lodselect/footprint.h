@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Footprints and the continuous level lambda (DESIGN: words; thesis 1.3).
+// Footprints and the continuous level lambda (docs/theory.md, section 11; thesis 1.3).
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The plan: the finest level each asset may use so that everything fits the budget (DESIGN, decision 5). Pure and
-// deterministic.
+// The plan: the finest level each asset may use so that everything fits the budget (docs/architecture.md, decision 5).
+// Pure and deterministic.
 #pragma once
 
 #include <cstdint>

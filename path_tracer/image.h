@@ -53,7 +53,7 @@ Result<ExrFile> read_exr(const std::filesystem::path& path);
 struct PngOptions {
   float exposure_stops = 0;  ///< RGB is multiplied by 2^exposure_stops
 };
-/// Writes R, G, B (or the one channel, as grey) as 8-bit sRGB [IEC 61966-2-1], clipped to [0, 1], NaN as 0, without
+/// Writes R, G, B (or the one channel, as grey) as 8-bit sRGB [IEC 1999], clipped to [0, 1], NaN as 0, without
 /// alpha, to a temporary name that is then renamed. Errors: Io, InvalidArgument (empty image).
 Result<void> write_png(const std::filesystem::path& path, const Image& image, const PngOptions& options = {});
 

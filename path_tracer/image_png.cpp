@@ -14,7 +14,7 @@ namespace farfield {
 
 namespace {
 
-// [IEC 61966-2-1]
+// [IEC 1999]
 uint8_t srgb_byte(float linear) {
   const float x = linear > 0 ? std::min(linear, 1.0f) : 0.0f;  // NaN becomes 0
   const float encoded = x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1.0f / 2.4f) - 0.055f;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Coefficients: Preetham et al. 1999, appendix A.2 (sky) and A.1 (sun).
+// Coefficients: [Preetham et al. 1999], appendix A.2 (sky) and A.1 (sun).
 #include "path_tracer/preetham_sky.h"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The analytic clear sky of Preetham, Shirley and Smits, "A practical analytic model for daylight", 1999.
+// The analytic clear sky of [Preetham et al. 1999].
 #pragma once
 
 #include "base/vec.h"

@@ -5,7 +5,7 @@
 //   |\                 2. sample alpha on a triangular lattice; marching triangles gives directed segments with the
 //   |  \               inside on their left; they chain into closed loops, along the triangle's border where the
 //   |####\             inside touches it (counter-clockwise loops are outlines, clockwise ones holes)
-//   |#####>\           3. straighten the loops (Douglas and Peucker 1973); crossings on the border stay where they are
+//   |#####>\           3. straighten the loops [Douglas and Peucker 1973]; crossings on the border stay where they are
 //   A--##----B         4. join holes, clip ears, flip edges to Delaunay
 //
 // All loops live in lattice coordinates (s, t): the point A + s (B - A) + t (C - A).

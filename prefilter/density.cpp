@@ -41,7 +41,7 @@ struct GaussLegendre {
 };
 
 /// Directions of one octant in the eigenframe and their weights (sum 1). Pole at the largest eigenvalue. The cubes
-/// (z = u^3, phi = pi/2 (1 - v^3)) crowd the nodes where sigma vanishes for a singular S [formula notes 4.1].
+/// (z = u^3, phi = pi/2 (1 - v^3)) crowd the nodes where sigma vanishes for a singular S (docs/theory.md, section 7.3).
 struct Octant {
   std::vector<double> z2, y2, x2;  ///< squared components along the largest, middle and smallest axis
   std::vector<double> weight;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From how often rays hit to how dense the volume must be (thesis 9.3.1; formula notes section 4).
+// From how often rays hit to how dense the volume must be (thesis 9.3.1; docs/theory.md, section 7).
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,8 @@ inline constexpr double kMaxDensityLength = 400;
 double optical_depth_of_hits(uint32_t hits, uint32_t rays);
 
 /// Mean over all directions w of exp(-density length sqrt(w^T S w)), as 1 - result, which keeps its digits for thin
-/// media. density, length >= 0. Pure. [formula notes 4.1: relative error < 1e-5 for sqrt(lambda_max) density length <=
-/// 30]
+/// media. density, length >= 0. Pure. Relative error below 1e-5 for sqrt(lambda_max) density length <= 30:
+/// docs/theory.md, section 7.3.
 double mean_opacity(const SymMat3& s, double density, double length);
 
 /// The density rho >= 0 of an SGGX microflake medium that lets exp(-optical_depth) through over `length`, averaged over

@@ -24,7 +24,7 @@ double twice_area(std::span<const glm::dvec2> points, std::span<const uint32_t> 
 std::vector<uvec3> clip_ears(std::span<const glm::dvec2> points, std::span<const uint32_t> ring);
 
 /// One ring from an outer (counter-clockwise) and its holes (clockwise): each hole is joined by a bridge that is walked
-/// once in each direction [Eberly, "Triangulation by Ear Clipping"].
+/// once in each direction [Eberly 1998].
 Ring join_holes(std::span<const glm::dvec2> points, Ring outer, std::vector<Ring> holes);
 
 }  // namespace farfield

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the materials around a collapsing edge mix (thesis 8.3, formula notes 3.1).
+// How the materials around a collapsing edge mix (thesis 8.3; docs/theory.md, section 6.1).
 #pragma once
 
 #include <span>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// [Loubet 2018, 8.2.2], formula notes 3.2. Points on the collapsed surface are weight * x + rest, so with fixed pairs
-// of points the best x is a weighted mean; then the pairs are found anew. Both half steps lower the sum.
+// [Loubet 2018, 8.2.2]; docs/theory.md, section 6.2. Points on the collapsed surface are weight * x + rest, so with
+// fixed pairs of points the best x is a weighted mean; then the pairs are found anew. Both half steps lower the sum.
 #include "prefilter/vertex_placement.h"
 
 #include <algorithm>
@@ -157,7 +157,7 @@ std::optional<dvec3> with_same_border_area(const dvec3& p, const dvec3& a, const
 }
 
 dvec3 closest_barycentric(const dvec3& p, const dvec3& a, const dvec3& b, const dvec3& c) {
-  // [Ericson 2005, Real-Time Collision Detection, 5.1.5]: by Voronoi regions of corners, edges, inside.
+  // [Ericson 2005, 5.1.5]: by Voronoi regions of corners, edges, inside.
   const dvec3 ab = b - a, ac = c - a, ap = p - a;
   const double d1 = glm::dot(ab, ap), d2 = glm::dot(ac, ap);
   if (d1 <= 0 && d2 <= 0) return {1, 0, 0};

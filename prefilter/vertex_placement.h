@@ -26,7 +26,7 @@ struct Placement {
 };
 
 /// Moves x from `start` so that the sum of squared distances between samples of each surface and the other surface
-/// falls, until it moves by less than `tolerance` [eq. 8.2.2]. The sum never grows. Pure function.
+/// falls, until it moves by less than `tolerance` [Loubet 2018, eq. 8.2.2]. The sum never grows. Pure function.
 Placement place_vertex(const CollapseRing& ring, const dvec3& start, double tolerance);
 
 /// The same measure for an x that is given.

@@ -2,7 +2,7 @@
 // Candidates first: every triangle marks the voxels it passes through, and these are widened by the reach of a voxel's
 // rays. Then each candidate casts its rays at the triangles, counts hits, averages what it hit, and solves for the
 // density that is hit as often [Loubet 2018, sections 9.2 and 9.3], and for the self-shadowing with which as much light
-// gets away as does from the points that were hit [14.1.4].
+// gets away as does from the points that were hit [Loubet 2018, 14.1.4].
 #include "prefilter/voxelize.h"
 
 #include <fmt/format.h>

@@ -8,15 +8,17 @@
 // Samples      weight = eval / true density of the sample; a zero weight is a failed sample (count it as black).
 // Media        sigma_t(w) = rho sigma(w), in 1/length. D is even: D(m) = D(-m), over the whole sphere.
 //
-// Three scalings of (rho, D) are in use; only rho D enters sigma_t, and phase functions do not depend on it:
+// Three scalings of (rho, D) are in use; only rho D enters sigma_t, and phase functions do not depend on it
+// (docs/theory.md, section 1):
 //
-//                   D                                  sigma(w)            isotropic   rho is
-//   SGGX            1 / (pi sqrt|S| (m^T S^-1 m)^2)    sqrt(w^T S w)       1           with lambda_max(S) = 1: the
-//   largest
-//                   integral: 4 R_G(eigenvalues)       = int D <w.m> dm                attenuation coefficient
-//   normalised      integral: 1                        int D <w.m> dm      1/4         flake area per volume, both
-//   faces (lobes) Jakob 2010      integral: 1                        int D |w.m| dm      1/2         one-sided flake
-//   area per volume
+// clang-format off
+//               D                                 sigma(w)          isotropic  rho is
+//   SGGX        1 / (pi sqrt|S| (m^T S^-1 m)^2),  sqrt(w^T S w)     1          with lambda_max(S) = 1: the largest
+//               int D = 4 R_G(eigenvalues)        = int D <w.m> dm             attenuation coefficient
+//   normalised  int D = 1                         int D <w.m> dm    1/4        flake area per volume, both faces
+//   (lobes)
+//   Jakob 2010  int D = 1                         int D |w.m| dm    1/2        one-sided flake area per volume
+// clang-format on
 //
 // Farfield stores the SGGX scaling with lambda_max(S) = 1, and the normalised one for trigonometric lobes. Rescaling
 // S -> S / c asks for rho -> rho sqrt(c). Averages of S do not have lambda_max = 1: rescale them.

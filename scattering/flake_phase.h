@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The phase function of prefiltered volumes: SGGX microflakes, diffuse, specular and transmitting, with isotropic
-// self-shadowing (Heitz et al. 2015; thesis 12.2, 13.3).
+// self-shadowing [Heitz et al. 2015] (thesis 12.2, 13.3).
 //
 // With A = self_shadowing, sigma(w) = sqrt(w^T S w), and m the flakes of sggx visible from wo:
 //

@@ -10,7 +10,7 @@ namespace farfield {
 /// 0 is no specular at all.
 inline float grazing_reflectance(const vec3& f0) { return std::min(1.0f, 25.0f * max_component(f0)); }
 
-/// Schlick's Fresnel, F0 + (F90 - F0) (1 - cos)^5. cos in [0, 1].
+/// Schlick's Fresnel [Schlick 1994], F0 + (F90 - F0) (1 - cos)^5. cos in [0, 1].
 inline vec3 schlick(const vec3& f0, float f90, float cos) {
   const float x = 1.0f - std::min(cos, 1.0f);
   const float x5 = (x * x) * (x * x) * x;
@@ -28,8 +28,8 @@ inline float fresnel_dielectric(float cos, float eta) {
   return 0.5f * (parallel * parallel + across * across);
 }
 
-/// Unpolarised reflectance of a conductor with index eta + i k against the outside [Born and Wolf, 13.4]. cos in [0,
-/// 1].
+/// Unpolarised reflectance of a conductor with index eta + i k against the outside [Born and Wolf 1999, 14.2]. cos in
+/// [0, 1].
 inline float fresnel_conductor(float cos, float eta, float k) {
   const float cos2 = cos * cos, sin2 = 1.0f - cos2;
   const float t0 = eta * eta - k * k - sin2;
@@ -42,7 +42,7 @@ inline float fresnel_conductor(float cos, float eta, float k) {
 
 /// The mean of (1 - w.m)^5 over the GGX facets m visible from w: with it, F0 + (F90 - F0) mean is the part of the light
 /// from w that meets the specular lobe, masked or not. What is left is there for a diffuse lobe underneath
-/// (Kelemen and Szirmay-Kalos 2001). From a table, absolute error below 0.02 (at grazing angles); a value, cheap to
+/// [Kelemen and Szirmay-Kalos 2001]. From a table, absolute error below 0.02 (at grazing angles); a value, cheap to
 /// copy. Immutable; any thread.
 class VisibleFresnel {
  public:

@@ -14,9 +14,9 @@ struct LobeFit {
 
 /// The best mixture of one cosine lobe about the eigenvector of the largest eigenvalue, one sine lobe about that of the
 /// smallest, and the isotropic lobe: non-negative least squares on the relative error of sigma, for every pair of
-/// exponents (thesis 13.1.2 gives no recipe; formula notes 2.6). Lobes cannot get below sigma_min / sigma_max of 0.125
-/// (cosine) or 0.195 (sine): sharper distributions fit with the error that rms_error reports. S = 0 gives rho_factor 0.
-/// About a millisecond. Pure; any thread.
+/// exponents (thesis 13.1.2 gives no recipe; docs/theory.md, section 3.6). Lobes cannot get below sigma_min / sigma_max
+/// of 0.125 (cosine) or 0.195 (sine): sharper distributions fit with the error that rms_error reports. S = 0 gives
+/// rho_factor 0. About a millisecond. Pure; any thread.
 LobeFit fit_lobes(const SymMat3& s);
 
 }  // namespace farfield

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Ellipsoid distributions of microfacets on a surface with geometric normal n, for any S against n
-// (thesis 8.3.9-8.3.11; derivation: formula notes section 6). An aligned S = alpha^2 (I - n n^T) + n n^T is GGX with
+// (thesis 8.3.9-8.3.11; derivation: docs/theory.md, section 5). An aligned S = alpha^2 (I - n n^T) + n n^T is GGX with
 // Smith masking.
 #pragma once
 

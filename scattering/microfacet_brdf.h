@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The BRDF lobes of ellipsoid microfacets, for any Fresnel function and either masking (thesis 8.3.9-8.3.11 with the
-// erratum of formula notes section 6: G1 in the denominator is the unclamped one, or nothing is reciprocal).
+// erratum of docs/theory.md, section 5: G1 in the denominator is the unclamped one, or nothing is reciprocal).
 // cos_o = n.wo > 0, cos_i = n.wi. Values are f |cos_i|.
 #pragma once
 

@@ -5,8 +5,8 @@ namespace farfield {
 namespace {
 
 // The tangent bound |x| <= (x^2 + c^2) / (2 c), c^2 = tr(S) / 3, turns the density sigma into a mixture of the uniform
-// and three cos^2 lobes, one per row (or column) of the factor: formula notes 2.7. `project` is w -> B^T w or w -> B w,
-// `axes` its rows.
+// and three cos^2 lobes, one per row (or column) of the factor: docs/theory.md, section 4. `project` is w -> B^T w or w
+// -> B w, `axes` its rows.
 template <typename T, typename Project>
 Vec3<T> sample_length_of(const Vec3<T> (&axes)[3], const Project& project, Rng& rng) {
   const T a0 = glm::dot(axes[0], axes[0]), a1 = glm::dot(axes[1], axes[1]), a2 = glm::dot(axes[2], axes[2]);

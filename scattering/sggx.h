@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// SGGX distributions of normals (Heitz, Dupuy, Crassin and Dachsbacher 2015), by their Cholesky factor S = B B^T: no
-// determinant, no inverse and no eigenvectors of S, so that needles and flat flakes stay exact in float (formula notes
-// 2.7 and 7.1). Scaling and directions: scattering/convention.h.
+// SGGX distributions of normals [Heitz et al. 2015], by their Cholesky factor S = B B^T: no determinant, no inverse and
+// no eigenvectors of S, so that needles and flat flakes stay exact in float (docs/theory.md, sections 4 and 10.1).
+// Scaling and directions: scattering/convention.h.
 #pragma once
 
 #include "base/random.h"
@@ -68,7 +68,8 @@ class BasicSggx {
   /// sqrt(w^T S w): projected area of the flakes, attenuation per rho.
   T sigma(const Vec3<T>& w) const { return glm::length(b_.transposed_times(w)); }
 
-  /// Density of normals over the whole sphere; integral 4 R_G [Heitz 2015, eq. 10]. m is unit, or 0, which gives 0.
+  /// Density of normals over the whole sphere; integral 4 R_G [Heitz et al. 2015, eq. 10]. m is unit, or 0, which gives
+  /// 0.
   T ndf(const Vec3<T>& m) const {
     const Vec3<T> u = b_.solve(m);
     const T u2 = glm::dot(u, u);
@@ -88,7 +89,7 @@ class BasicSggx {
     return glm::normalize(b_ * cosine_lobe(glm::normalize(w), u1, u2));
   }
 
-  /// Specular phase function D(h) / (4 sigma(wo)); also its sampling density [Heitz 2015, eq. 15].
+  /// Specular phase function D(h) / (4 sigma(wo)); also its sampling density [Heitz et al. 2015, eq. 15].
   T specular_phase(const Vec3<T>& wo, const Vec3<T>& wi) const { return ndf(half_vector(wo, wi)) / (T(4) * sigma(wo)); }
   Vec3<T> sample_specular(const Vec3<T>& wo, T u1, T u2) const { return reflect_about(wo, sample_visible(wo, u1, u2)); }
 

@@ -26,8 +26,8 @@ int round_to(double correlation, int one) {
 }
 
 // Rounding pushes about half of the near-singular matrices out of the cone. Somewhere within one unit of each rounded
-// entry there is one inside: (one - 1) / one times the correlations, rounded, is (formula notes 7.10). The nearest is
-// taken.
+// entry there is one inside: (one - 1) / one times the correlations, rounded, is (docs/theory.md, section 10.10). The
+// nearest is taken.
 Correlations quantise(double xy, double xz, double yz, int one) {
   const Correlations nearest{round_to(xy, one), round_to(xz, one), round_to(yz, one)};
   if (is_semidefinite(nearest, one)) return nearest;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SGGX matrices in few bytes (thesis 10.1.3; formula notes 7.10): sigma_i = sqrt(S_ii) and correlations
+// SGGX matrices in few bytes (thesis 10.1.3; docs/theory.md, section 10.10): sigma_i = sqrt(S_ii) and correlations
 // r_ij = S_ij / (sigma_i sigma_j), for S scaled to lambda_max(S) = 1.
 #pragma once
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The reflectance of prefiltered surfaces: ellipsoid-NDF microfacets, diffuse and specular, and diffuse transmission
-// (thesis 8.3.9-8.3.11, formula notes section 6). Surfaces are two-sided.
+// (thesis 8.3.9-8.3.11; docs/theory.md, section 5). Surfaces are two-sided.
 //
 //   specular      F D(h) G2 / (4 n.wo n.wi)            D of specular_sggx(sggx, roughness2)
 //   diffuse       E_m [ diffuse c(wo) c(wi) <wi.m> G2 / G1u(wo) ] / (pi n.wi)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Trigonometric lobes: the distributions of flake normals cos^2n and sin^2n of the angle to an axis, whose convolutions
 // with a shadowing function A(w) = w^T S w are polynomials (thesis 13.2; exact coefficients for any n, sphere integrals
-// and samplers: formula notes section 2). Normalised scaling: the integral of D over the sphere is 1.
+// and samplers: docs/theory.md, section 3). Normalised scaling: the integral of D over the sphere is 1.
 #pragma once
 
 #include <array>

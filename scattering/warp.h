@@ -35,7 +35,8 @@ Vec3<T> reflect_about(const Vec3<T>& w, const Vec3<T>& m) {
   return T(2) * glm::dot(w, m) * m - w;
 }
 
-/// Where |wo + wi|^2 is below this, the half vector is meaningless and D(h) is taken as 0 (formula notes 7.6).
+/// Where |wo + wi|^2 is below this, the half vector is meaningless and D(h) is taken as 0 (docs/theory.md,
+/// section 10.6).
 inline constexpr double kSmallestHalfVector2 = 1e-12;
 
 /// (wo + wi) / |wo + wi|, or 0 when the directions are opposite.

@@ -6,7 +6,7 @@
 
 namespace farfield {
 
-/// A small random stream (PCG32, O'Neill 2014). Copyable value; one thread at a time.
+/// A small random stream (PCG32) [O'Neill 2014]. Copyable value; one thread at a time.
 /// Two streams with different `sequence` never overlap.
 class Rng {
  public:

@@ -1,14 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // The runtime: baked assets, their instances, a memory budget, and one Embree user geometry for all of them.
 //
-//   auto runtime = farfield::Runtime::create(device, {.budget_bytes = 4ull << 30});
-//   auto oak = (*runtime)->open_asset("oak.farfield");
-//   (*runtime)->add_instance(*oak, local_to_world);
-//   (*runtime)->set_cameras({{eye, 0.0f, pixel_spread}});
-//   (*runtime)->plan_frame();
-//   unsigned geom_id = *(*runtime)->attach(scene);  rtcCommitScene(scene);
-//   ... rtcIntersect1(scene, &ray_context.embree, &ray_hit) ...
-//   if (ray_hit.hit.geomID == geom_id) { auto interaction = (*runtime)->interaction(ray_hit, ray_context); ... }
+//   farfield::RuntimeOptions options;
+//   options.budget_bytes = 4ull << 30;
+//   auto runtime = farfield::Runtime::create(device, options).value();
+//   farfield::AssetId oak = runtime->open_asset("oak.farfield").value();
+//   runtime->add_instance(oak, local_to_world).value();
+//   runtime->set_cameras({{eye, 0.0f, pixel_spread}});
+//   runtime->plan_frame().value();
+//   unsigned geometry = runtime->attach(scene).value();
+//   rtcCommitScene(scene);
+//
+//   farfield::RayContext context;  // per ray
+//   context.cone_spread = pixel_spread;
+//   rtcIntersect1(scene, &context.embree, &ray_hit);
+//   if (ray_hit.hit.geomID == geometry) throughput *= runtime->interaction(ray_hit, context).sample(rng).weight;
+//
+// value() throws what went wrong; hosts that go on without look at the Result. A test compiles these lines.
 #pragma once
 
 #include <embree3/rtcore.h>
@@ -29,7 +37,7 @@
 
 namespace farfield {
 
-/// How two neighbouring levels are mixed (DESIGN, decision 3).
+/// How two neighbouring levels are mixed (docs/architecture.md, decision 3).
 enum class Blend : uint8_t {
   Dissolve,  ///< each path sees one of the two, picked by RayContext::path_seed
 };

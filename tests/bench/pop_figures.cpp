@@ -3,9 +3,9 @@
 //
 //   build/release/bin/pop_figures ASSET.farfield
 //
-// For each stored level k: the same view with the same random numbers at lambda k - 1e-3 and k + 1e-3 (pop as in
-// DESIGN.md, before two seeds are taken off), the same at k - 1e-3 with another seed, and how the mean changes over [k
-// - 1/2, k + 1/2].
+// For each stored level k: the same view with the same random numbers at lambda k - 1e-3 and k + 1e-3 (the pop of
+// docs/error_metric.md, before two seeds are taken off), the same at k - 1e-3 with another seed, and how the mean
+// changes over [k - 1/2, k + 1/2].
 #include <fmt/format.h>
 
 #include <cmath>

@@ -108,7 +108,7 @@ TEST(AlphaCut, FullAndEmptyMasksKeepOrDropTheWholeTriangle) {
   EXPECT_TRUE(cut_by_mask(masked(8, [](float, float) { return 1.0f; }), kLower, 16).is_whole());
   EXPECT_TRUE(cut_by_mask(masked(8, [](float, float) { return 0.2f; }), kLower, 16).triangles.empty());
   SourceMaterial at_cutoff = masked(1, [](float, float) { return 1.0f; });
-  at_cutoff.alpha = at_cutoff.alpha_cutoff = 0.25f;  // alpha >= cutoff stays [glTF 2.0, 3.9.4]
+  at_cutoff.alpha = at_cutoff.alpha_cutoff = 0.25f;  // alpha >= cutoff stays [Khronos 2021, 3.9.4]
   EXPECT_TRUE(cut_by_mask(at_cutoff, kLower, 1).is_whole());
 }
 

@@ -29,7 +29,7 @@ SparseVolume voxelized(const Surface& geometry, double voxel_size, uint32_t rays
   return std::move(*volume);
 }
 
-/// Flake area: rho_g R_G(S) is half of the one-sided area per volume (formula notes section 1).
+/// Flake area: rho R_G(S) is half of the one-sided area per volume (docs/theory.md, section 1).
 double flake_area(const SparseVolume& volume) {
   double sum = 0;
   for (const Voxel& v : volume.voxels) {

@@ -12,7 +12,7 @@ namespace {
 
 using namespace test;
 
-// The table of the formula notes (2.6): eigenvalues, rms error of sigma, ratio of areas.
+// The table of docs/theory.md, section 3.6: eigenvalues, rms error of sigma, ratio of areas.
 TEST(LobeFit, IsAsGoodAsTheReference) {
   struct Row {
     dvec3 eigen;

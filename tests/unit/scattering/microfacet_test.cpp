@@ -66,7 +66,7 @@ TEST(Microfacets, ProjectedAreaIsItsIntegral) {
   }
 }
 
-// The table of formula notes section 6: albedo with F = 1 and separable masking, for alpha, the tilt of the ellipsoid
+// The table of docs/theory.md, section 5: albedo with F = 1 and separable masking, for alpha, the tilt of the ellipsoid
 // against n (degrees), and theta = 0, +70 (towards the tilt), -70. Two digits: 0.01 and 40000 samples' noise.
 TEST(Microfacets, WhiteFurnaceLosesWhatTheReferenceLoses) {
   struct Row {
