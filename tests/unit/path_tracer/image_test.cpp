@@ -8,7 +8,7 @@
 
 #include "base/random.h"
 #include "tests/support/file_size_limit.h"
-#include "tests/support/sample_asset.h"
+#include "tests/support/files.h"
 
 namespace farfield {
 namespace {
