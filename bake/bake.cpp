@@ -21,6 +21,7 @@
 #include "bake/slab_hull.h"
 #include "base/file_io.h"
 #include "base/hash.h"
+#include "base/result.h"
 #include "bvh/level_scene.h"
 #include "cache/level_file.h"
 #include "prefilter/macrosurface.h"
@@ -193,26 +194,22 @@ class Baker {
     last_level_ =
         options_.source_only ? 0 : static_cast<uint32_t>(std::bit_width(options_.finest_grid / options_.coarsest_grid));
 
-    if (auto done = bake_source(); !done) return tl::unexpected<Error>(done.error());
+    FARFIELD_TRY(bake_source());
     for (uint32_t level = 1; level <= last_level_; ++level) {
-      if (auto done = bake_level(level, std::ldexp(finest_resolution, static_cast<int>(level) - 1)); !done) {
-        return tl::unexpected<Error>(done.error());
-      }
+      FARFIELD_TRY(bake_level(level, std::ldexp(finest_resolution, static_cast<int>(level) - 1)));
     }
     report_.manifest.hull = hull_.corners();
     for (const vec3& corner : report_.manifest.hull) report_.manifest.bounds.extend(corner);
-    if (auto done = write_manifest(workspace_.asset_dir(), report_.manifest); !done) {
-      return tl::unexpected<Error>(done.error());
-    }
-    if (auto done = workspace_.publish(); !done) return tl::unexpected<Error>(done.error());
-    report_progress("done", 1);
+    FARFIELD_TRY(write_manifest(workspace_.asset_dir(), report_.manifest));
+    FARFIELD_TRY(workspace_.publish());
+    options_.job.report(1, "done");
     return std::move(report_);
   }
 
  private:
   /// Level 0: the source as it is.
   Result<void> bake_source() {
-    report_progress("level 0: write", 0);
+    options_.job.report(0, "level 0: write");
     LevelReport level_report;
     level_report.grid = 2 * options_.finest_grid;
     const Stopwatch watch;
@@ -231,17 +228,15 @@ class Baker {
     level_report.grid = options_.finest_grid >> (level - 1);
 
     const SurfaceOrder order = simplify_surface(level, resolution, level_report);
-    if (is_cancelled()) return cancelled();
+    if (options_.job.is_cancelled()) return cancelled();
 
-    auto volume = voxelize_rest(level, resolution, level_report);
-    if (!volume) return tl::unexpected<Error>(volume.error());
+    FARFIELD_TRY_LET(auto volume, voxelize_rest(level, resolution, level_report));
 
-    report_progress(fmt::format("level {}: write", level), share_done(level, 0.98));
+    options_.job.report(share_done(level, 0.98), fmt::format("level {}: write", level));
     const Stopwatch watch;
     Result<void> done;
     if (!level_report.worthless) {
-      done =
-          store_level(pack_level(level, resolution, surface_, order, std::move(*volume), from_stored_), level_report);
+      done = store_level(pack_level(level, resolution, surface_, order, std::move(volume), from_stored_), level_report);
     }
     level_report.write_seconds = watch.seconds();
     report_.levels.push_back(level_report);
@@ -250,16 +245,16 @@ class Baker {
 
   /// Steps A and S: what is no longer surface at this resolution leaves surface_, the rest is simplified.
   SurfaceOrder simplify_surface(uint32_t level, double resolution, LevelReport& level_report) {
-    report_progress(fmt::format("level {}: analyse", level), share_done(level, 0));
+    options_.job.report(share_done(level, 0), fmt::format("level {}: analyse", level));
     const Stopwatch analysis;
     const auto is_macrosurface = classify_macrosurface(surface_, static_cast<float>(resolution));
     const SplitSurface parts = split(surface_, is_macrosurface, sub_resolution_);
     level_report.macrosurface_triangles = parts.macrosurface.triangles.size();
     level_report.voxelized_triangles = sub_resolution_.triangles.size();
     level_report.analysis_seconds = analysis.seconds();
-    if (is_cancelled()) return {};
+    if (options_.job.is_cancelled()) return {};
 
-    report_progress(fmt::format("level {}: simplify", level), share_done(level, 0.03));
+    options_.job.report(share_done(level, 0.03), fmt::format("level {}: simplify", level));
     const Stopwatch simplification;
     const SimplifyResult simplified = simplify(parts.macrosurface, {.resolution = static_cast<float>(resolution)});
     SurfaceOrder order = order_surface(simplified.surface);
@@ -276,32 +271,29 @@ class Baker {
   /// Step V, or its result from an interrupted bake.
   Result<LevelData> voxelize_rest(uint32_t level, double resolution, LevelReport& level_report) {
     const std::string stage = fmt::format("level {}: voxelise", level);
-    report_progress(stage, share_done(level, 0.05));
+    options_.job.report(share_done(level, 0.05), stage);
     const Stopwatch watch;
     const VoxelLattice lattice{lattice_origin_, resolution};
     const VoxelizeOptions voxelize_options{
         .rays_per_voxel = options_.rays_per_voxel,
         .seed = level,
-        .cancel = options_.cancel,
-        .progress = [&](double done) { report_progress(stage, share_done(level, 0.05 + 0.92 * done)); }};
+        .job = options_.job.step(stage, share_done(level, 0.05), share_done(level, 0.97))};
     const uint64_t key = volume_key(sub_resolution_, lattice, voxelize_options);
     if (auto stored = workspace_.load_volume(key)) {
       level_report.resumed = true;
       return std::move(*stored);
     }
     if (level != last_level_) {  // the root is always wanted
-      const auto size = estimate_volume(sub_resolution_, lattice, voxelize_options);
-      if (!size) return tl::unexpected<Error>(size.error());
-      if (least_bytes(*size, sub_resolution_, surface_) > most_bytes_worth_writing(level)) {
+      FARFIELD_TRY_LET(const auto size, estimate_volume(sub_resolution_, lattice, voxelize_options));
+      if (least_bytes(size, sub_resolution_, surface_) > most_bytes_worth_writing(level)) {
         level_report.worthless = true;
         level_report.triangles = surface_.triangles.size();
         level_report.voxelize_seconds = watch.seconds();
         return LevelData{};
       }
     }
-    const auto volume = voxelize(sub_resolution_, lattice, voxelize_options);
-    if (!volume) return tl::unexpected<Error>(volume.error());
-    LevelData packed = pack_volume(*volume);
+    FARFIELD_TRY_LET(const auto volume, voxelize(sub_resolution_, lattice, voxelize_options));
+    LevelData packed = pack_volume(volume);
     if (packed.has_volume()) {
       if (const auto stored = workspace_.store_volume(key, packed); !stored) {
         report_.warnings.push_back("an interrupted bake could not be resumed: " + stored.error().message);
@@ -316,13 +308,13 @@ class Baker {
     const uint32_t number = level.header.level;
     level_report.triangles = face_count(level);
     level_report.voxels = voxel_count(level);
-    if (is_cancelled()) return cancelled();
+    if (options_.job.is_cancelled()) return cancelled();
     if (!level.has_surface() && !level.has_volume()) return {};  // too thin for any ray to have hit it
 
     const LevelView view = view_of(level);
-    const auto cost = options_.measure_resident ? options_.measure_resident(view) : measure_level_scene(view);
-    if (!cost) return tl::unexpected<Error>(cost.error());
-    if (cost->resident_bytes > most_bytes_worth_writing(number)) return {};
+    FARFIELD_TRY_LET(const auto cost,
+                     options_.measure_resident ? options_.measure_resident(view) : measure_level_scene(view));
+    if (cost.resident_bytes > most_bytes_worth_writing(number)) return {};
     level_report.is_written = true;
 
     LevelEntry entry;
@@ -333,15 +325,13 @@ class Baker {
     entry.triangles = face_count(level);
     entry.voxels = voxel_count(level);
     entry.bricks = level.bricks.size();
-    entry.resident_bytes = cost->resident_bytes;
-    entry.build_peak_bytes = cost->build_peak_bytes;
+    entry.resident_bytes = cost.resident_bytes;
+    entry.build_peak_bytes = cost.build_peak_bytes;
     const fs::path path = workspace_.asset_dir() / entry.file;
-    const auto bytes = write_level(path, level);
-    if (!bytes) return tl::unexpected<Error>(bytes.error());
-    entry.file_bytes = *bytes;
-    const auto hash = hash_level_file(path);
-    if (!hash) return tl::unexpected<Error>(hash.error());
-    entry.file_hash = *hash;
+    FARFIELD_TRY_LET(const auto bytes, write_level(path, level));
+    entry.file_bytes = bytes;
+    FARFIELD_TRY_LET(const auto hash, hash_level_file(path));
+    entry.file_hash = hash;
     report_.manifest.levels.push_back(entry);
 
     add_to_hull(view, hull_);
@@ -357,7 +347,6 @@ class Baker {
     return level == last_level_ ? before - std::min<uint64_t>(before, 1) : before - before / 10;
   }
 
-  bool is_cancelled() const { return options_.cancel && options_.cancel->load(std::memory_order_relaxed); }
   static tl::unexpected<Error> cancelled() { return make_error(ErrorCode::Cancelled, "bake: cancelled"); }
 
   /// How much of the whole bake is done when `part` of a level is: levels are weighted by about the rays they cast.
@@ -370,10 +359,6 @@ class Baker {
     }
     constexpr double kSource = 0.05;  // import and level 0
     return kSource + (1 - kSource) * (before + part * weight(level)) / all;
-  }
-
-  void report_progress(const std::string& stage, double done) const {
-    if (options_.progress) options_.progress(stage, done);
   }
 
   const BakeOptions& options_;
@@ -390,18 +375,17 @@ class Baker {
 }  // namespace
 
 Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeOptions& options) {
-  if (auto checked = check_options(options); !checked) return tl::unexpected<Error>(checked.error());
+  FARFIELD_TRY(check_options(options));
   // What is no asset cannot be up to date: refused before the import, which may take minutes. An asset with other
   // files in it may be; then they do no harm.
   if (auto checked = check_replaceable(out); !checked && !read_manifest(out)) {
     return tl::unexpected<Error>(checked.error());
   }
   const Stopwatch watch;
-  if (options.progress) options.progress("import", 0);
-  auto asset = import_asset(source, options.import);
-  if (!asset) return tl::unexpected<Error>(asset.error());
+  options.job.report(0, "import");
+  FARFIELD_TRY_LET(auto asset, import_asset(source, options.import));
   const double import_seconds = watch.seconds();
-  auto report = bake(std::move(*asset), source.filename().string(), out, options);
+  auto report = bake(std::move(asset), source.filename().string(), out, options);
   if (report) {
     report->import_seconds = import_seconds;
     report->total_seconds += import_seconds;
@@ -411,7 +395,7 @@ Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeO
 
 Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, const fs::path& out,
                         const BakeOptions& options) {
-  if (auto checked = check_options(options); !checked) return tl::unexpected<Error>(checked.error());
+  FARFIELD_TRY(check_options(options));
   const Stopwatch watch;
   BakeReport report;
   report.warnings = std::move(asset.warnings);
@@ -425,9 +409,8 @@ Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, con
     report.total_seconds = watch.seconds();
     return report;
   }
-  auto workspace = BakeWorkspace::open(out);
-  if (!workspace) return tl::unexpected<Error>(workspace.error());
-  auto baked = Baker(options, std::move(asset.surface), std::move(*workspace), std::move(report)).run();
+  FARFIELD_TRY_LET(auto workspace, BakeWorkspace::open(out));
+  auto baked = Baker(options, std::move(asset.surface), std::move(workspace), std::move(report)).run();
   if (baked) baked->total_seconds = watch.seconds();
   return baked;
 }

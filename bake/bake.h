@@ -2,13 +2,13 @@
 // The bake: a source becomes a folder of levels (thesis 6.4 and chapters 7-10).
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "base/job.h"
 #include "base/result.h"
 #include "cache/level.h"
 #include "cache/manifest.h"
@@ -25,11 +25,8 @@ struct BakeOptions {
 
   /// What a level costs a host. Empty: measured by loading it as the runtime would (measure_level_scene).
   std::function<Result<LevelCost>(const LevelView&)> measure_resident;
-  /// Called from the baking thread with the stage's name ("level 3: voxelise") and how much of the whole is done, in
-  /// [0, 1].
-  std::function<void(const std::string& stage, double done)> progress;
-  /// Polled often; when it becomes true the bake stops with Cancelled and what is finished stays for the next run.
-  const std::atomic<bool>* cancel = nullptr;
+  /// Reports come from the baking thread ("level 3: voxelise"). After a cancel what is finished stays for the next run.
+  Job job;
 };
 
 /// One level's part of the report.

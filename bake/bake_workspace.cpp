@@ -22,6 +22,7 @@
 #include <utility>
 
 #include "base/hash.h"
+#include "base/result.h"
 #include "cache/level_file.h"
 #include "cache/manifest.h"
 
@@ -159,12 +160,11 @@ BakeWorkspace::~BakeWorkspace() {
 
 Result<BakeWorkspace> BakeWorkspace::open(const fs::path& out_path) {
   const fs::path out = without_trailing_slash(out_path);
-  if (auto checked = check_replaceable(out); !checked) return tl::unexpected<Error>(checked.error());
+  FARFIELD_TRY(check_replaceable(out));
   fs::path folder = out;
   folder += ".partial";
-  const auto lock = lock_folder(folder);
-  if (!lock) return tl::unexpected<Error>(lock.error());
-  BakeWorkspace workspace(out, folder, *lock);
+  FARFIELD_TRY_LET(const auto lock, lock_folder(folder));
+  BakeWorkspace workspace(out, folder, lock);
   std::error_code error;
   fs::remove_all(workspace.asset_dir(), error);  // of an interrupted bake
   if (!error) fs::create_directory(workspace.asset_dir(), error);
@@ -177,29 +177,16 @@ fs::path BakeWorkspace::volume_path(uint64_t key) const { return folder_ / ("vol
 std::optional<LevelData> BakeWorkspace::load_volume(uint64_t key) const {
   const auto file = LevelFile::open(volume_path(key), LevelCheck::Full);
   if (!file) return std::nullopt;
-  const LevelView& view = (*file)->view();
-  LevelData volume;
-  volume.header = view.header;
-  const auto copy = [](const auto& from, auto& to) { to.assign(from.begin(), from.end()); };
-  copy(view.brick_table, volume.brick_table);
-  copy(view.bricks, volume.bricks);
-  copy(view.voxel_sggx, volume.voxel_sggx);
-  copy(view.voxel_diffuse, volume.voxel_diffuse);
-  copy(view.voxel_specular, volume.voxel_specular);
-  copy(view.voxel_roughness2, volume.voxel_roughness2);
-  copy(view.voxel_transmission, volume.voxel_transmission);
-  copy(view.voxel_self_shadowing, volume.voxel_self_shadowing);
-  return volume;
+  return copy_of((*file)->view());
 }
 
 Result<void> BakeWorkspace::store_volume(uint64_t key, const LevelData& volume) const {
-  const auto written = write_level(volume_path(key), volume);
-  if (!written) return tl::unexpected<Error>(written.error());
+  FARFIELD_TRY(write_level(volume_path(key), volume));
   return {};
 }
 
 Result<void> BakeWorkspace::publish() {
-  if (auto checked = check_replaceable(out_); !checked) return checked;
+  FARFIELD_TRY(check_replaceable(out_));
   std::error_code error;
   const fs::path aside = folder_ / "previous";
   const int renamed =

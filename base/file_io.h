@@ -11,10 +11,11 @@
 
 namespace farfield {
 
-/// Writes the concatenated pieces to `path`: to a temporary name in the same folder, synced, renamed, the folder
-/// synced. After an error nothing of it is left and what was at `path` before is untouched, unless the disk fails when
-/// the folder is synced: then the new file is there, and the error says so. Any thread; two writers of one path do not
-/// disturb each other, the last rename wins. Errors: Io, naming the path, the system's words, a remedy.
+/// What the system says of an errno.
+std::string system_words(int error);
+
+/// Writes the concatenated pieces to `path`, whole or not at all, as TemporaryFile does. Any thread. Errors: those of
+/// TemporaryFile::commit().
 Result<void> write_file_atomically(const std::filesystem::path& path,
                                    std::span<const std::span<const std::byte>> pieces);
 

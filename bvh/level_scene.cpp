@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/result.h"
 #include "cache/level_file.h"
 
 namespace farfield {
@@ -88,15 +89,13 @@ Result<LevelCost> measure_level_scene(BvhDevice& device, const LevelView& level)
   LevelView padded = level;
   padded.positions = std::span<const vec3>(padded_positions.data(), level.positions.size());
 
-  const Result<LevelScene> scene = LevelScene::build(device, padded);
-  if (!scene) return tl::unexpected(scene.error());
-  return level_cost(level, *scene);
+  FARFIELD_TRY_LET(const auto scene, LevelScene::build(device, padded));
+  return level_cost(level, scene);
 }
 
 Result<LevelCost> measure_level_scene(const LevelView& level) {
-  const Result<std::unique_ptr<BvhDevice>> device = BvhDevice::create();
-  if (!device) return tl::unexpected(device.error());
-  return measure_level_scene(**device, level);
+  FARFIELD_TRY_LET(const auto device, BvhDevice::create());
+  return measure_level_scene(*device, level);
 }
 
 }  // namespace farfield

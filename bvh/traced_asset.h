@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "base/result.h"
 #include "base/vec.h"
 #include "bvh/brick_volume.h"
 #include "bvh/level_scene.h"
@@ -20,13 +21,13 @@ struct TracedLevel {
   BrickVolume volume;
   uint32_t slot = 0;        ///< its index among the asset's stored levels
   uint32_t face_count = 0;  ///< of the surface
+  uint32_t voxel_count = 0;
 
   /// Builds the BVH. Errors: those of LevelScene::build.
   static Result<std::unique_ptr<TracedLevel>> build(BvhDevice& device, const LevelView& level, uint32_t slot) {
-    Result<LevelScene> scene = LevelScene::build(device, level);
-    if (!scene) return tl::unexpected(scene.error());
-    return std::make_unique<TracedLevel>(
-        TracedLevel{level, std::move(*scene), BrickVolume(level), slot, farfield::face_count(level)});
+    FARFIELD_TRY_LET(auto scene, LevelScene::build(device, level));
+    return std::make_unique<TracedLevel>(TracedLevel{level, std::move(scene), BrickVolume(level), slot,
+                                                     farfield::face_count(level), farfield::voxel_count(level)});
   }
 };
 

@@ -32,25 +32,19 @@ vec3 unpack_color(PackedColor color) {
 LevelView view_of(const LevelData& level) {
   LevelView view;
   view.header = level.header;
-  view.positions = level.positions;
-  view.quads = level.quads;
-  view.quad_first_face = level.quad_first_face;
-  view.face_sggx = level.face_sggx;
-  view.face_diffuse = level.face_diffuse;
-  view.face_specular = level.face_specular;
-  view.face_roughness2 = level.face_roughness2;
-  view.face_transmission = level.face_transmission;
-  view.brick_table = level.brick_table;
-  view.bricks = level.bricks;
-  view.voxel_sggx = level.voxel_sggx;
-  view.voxel_diffuse = level.voxel_diffuse;
-  view.voxel_specular = level.voxel_specular;
-  view.voxel_roughness2 = level.voxel_roughness2;
-  view.voxel_transmission = level.voxel_transmission;
-  view.voxel_self_shadowing = level.voxel_self_shadowing;
-  view.morph_vertex = level.morph_vertex;
-  view.morph_face = level.morph_face;
+#define FARFIELD_VIEW(id, Name, field, Element, Group) view.field = level.field;
+  FARFIELD_LEVEL_ARRAYS(FARFIELD_VIEW)
+#undef FARFIELD_VIEW
   return view;
+}
+
+LevelData copy_of(const LevelView& level) {
+  LevelData data;
+  data.header = level.header;
+#define FARFIELD_COPY(id, Name, field, Element, Group) data.field.assign(level.field.begin(), level.field.end());
+  FARFIELD_LEVEL_ARRAYS(FARFIELD_COPY)
+#undef FARFIELD_COPY
+  return data;
 }
 
 }  // namespace farfield

@@ -82,30 +82,41 @@ inline ivec3 brick_coordinates(const LevelHeader& header, uint64_t table_index) 
           static_cast<int>(table_index / (x * y))};
 }
 
+/// Every array of a level, once, in the order in which they lie in the file: ARRAY(id in files, Name, field, element,
+/// group). Ids never change their meaning. The first two arrays are only read by BVH builds, the last two only by
+/// morphs: ends of the file that can be given back. Arrays of one group have the same length; those of faces and voxels
+/// may be absent, and then mean the default written beside them.
+// clang-format off
+#define FARFIELD_LEVEL_ARRAYS(ARRAY)                                                                                 \
+  /* surface */                                                                                                      \
+  ARRAY( 1, Positions,          positions,            vec3,              Vertices)      /* vertices */               \
+  ARRAY( 2, Quads,              quads,                Quad,              Quads)         /* in Morton order */        \
+  ARRAY( 3, QuadFirstFace,      quad_first_face,      uint32_t,          Quads)         /* face 0; face 1 follows */ \
+  ARRAY( 4, FaceSggx,           face_sggx,            PackedSurfaceSggx, Faces)         /* normals; n n^T */         \
+  ARRAY( 5, FaceDiffuse,        face_diffuse,         PackedColor,       Faces)         /* albedo; 0 */              \
+  ARRAY( 6, FaceSpecular,       face_specular,        PackedColor,       Faces)         /* F0; 0 */                  \
+  ARRAY( 7, FaceRoughness2,     face_roughness2,      uint8_t,           Faces)         /* unorm8 of alpha^2, with specular */ \
+  ARRAY( 8, FaceTransmission,   face_transmission,    PackedColor,       Faces)         /* diffuse; 0 */             \
+  /* volume */                                                                                                       \
+  ARRAY( 9, BrickTable,         brick_table,          uint32_t,          BrickTable)    /* x fastest; or kNoBrick */ \
+  ARRAY(10, Bricks,             bricks,               Brick,             Bricks)        /* in the table's order */   \
+  ARRAY(11, VoxelSggx,          voxel_sggx,           PackedFlakeSggx,   Voxels)        /* flakes; identity */       \
+  ARRAY(12, VoxelDiffuse,       voxel_diffuse,        PackedColor,       Voxels)        /* as for faces */           \
+  ARRAY(13, VoxelSpecular,      voxel_specular,       PackedColor,       Voxels)                                     \
+  ARRAY(14, VoxelRoughness2,    voxel_roughness2,     uint8_t,           Voxels)                                     \
+  ARRAY(15, VoxelTransmission,  voxel_transmission,   PackedColor,       Voxels)                                     \
+  ARRAY(16, VoxelSelfShadowing, voxel_self_shadowing, uint8_t,           Voxels)        /* unorm8 of A in (0, 1]; 1 */ \
+  /* from the next finer stored level: where its vertices and faces are in this one, or kMorph... */                \
+  ARRAY(17, MorphVertex,        morph_vertex,         uint32_t,          MorphVertices)                              \
+  ARRAY(18, MorphFace,          morph_face,           uint32_t,          MorphFaces)
+// clang-format on
+
 /// The arrays, owned (Array = std::vector<T>) while baking, or as spans into a mapped file at run time.
 template <template <typename> class Array>
 struct LevelArrays {
-  // Surface
-  Array<vec3> positions;                 ///< vertices
-  Array<Quad> quads;                     ///< in Morton order
-  Array<uint32_t> quad_first_face;       ///< face 0 of each quad; face 1, if any, follows it
-  Array<PackedSurfaceSggx> face_sggx;    ///< distribution of normals; absent: n n^T of the geometric normal
-  Array<PackedColor> face_diffuse;       ///< diffuse albedo; absent: 0
-  Array<PackedColor> face_specular;      ///< specular reflectance at normal incidence; absent: 0
-  Array<uint8_t> face_roughness2;        ///< unorm8 of alpha^2 of the specular lobe; present with face_specular
-  Array<PackedColor> face_transmission;  ///< diffuse transmission albedo; absent: 0
-  // Volume
-  Array<uint32_t> brick_table;        ///< brick_dims.x * y * z indices into bricks or kNoBrick, x fastest
-  Array<Brick> bricks;                ///< in the order of the table
-  Array<PackedFlakeSggx> voxel_sggx;  ///< absent: identity (isotropic flakes)
-  Array<PackedColor> voxel_diffuse;   ///< as for faces
-  Array<PackedColor> voxel_specular;
-  Array<uint8_t> voxel_roughness2;
-  Array<PackedColor> voxel_transmission;
-  Array<uint8_t> voxel_self_shadowing;  ///< unorm8 of A in (0, 1] (thesis 12.2); absent: 1
-  // Morph map from the next finer stored level, here called k-1
-  Array<uint32_t> morph_vertex;  ///< for each vertex of level k-1: vertex of this level, or kMorphVoxelized
-  Array<uint32_t> morph_face;    ///< for each face of level k-1: face of this level, kMorphCollapsed or kMorphVoxelized
+#define FARFIELD_FIELD(id, Name, field, Element, Group) Array<Element> field;
+  FARFIELD_LEVEL_ARRAYS(FARFIELD_FIELD)
+#undef FARFIELD_FIELD
 
   bool has_surface() const { return !quads.empty(); }
   bool has_volume() const { return !bricks.empty(); }
@@ -141,6 +152,7 @@ struct LevelView : LevelArrays<ArrayView> {
   LevelHeader header;
 };
 LevelView view_of(const LevelData& level);
+LevelData copy_of(const LevelView& level);
 
 /// What a level costs a host, as the manifest records it.
 struct LevelCost {

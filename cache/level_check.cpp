@@ -8,6 +8,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "cache/level_format.h"
+
 namespace farfield {
 
 namespace {
@@ -31,16 +33,14 @@ Problem check_header(const LevelView& level) {
 }
 
 /// The arrays of one group are absent or as long as the group.
-struct Group {
-  const char* name;
-  uint64_t length;
-
-  template <typename T>
-  Problem check(const char* array_name, std::span<const T> array) const {
-    if (array.empty() || array.size() == length) return {};
-    return fmt::format("{} has {} elements for {} {}", array_name, array.size(), length, name);
-  }
-};
+Problem check_lengths(const LevelView& level, SectionGroup group, const char* name, uint64_t length) {
+  Problem problem;
+  for_each_grouped_section(level, [&](SectionId id, SectionGroup of, const auto& array) {
+    if (problem || of != group || array.empty() || array.size() == length) return;
+    problem = fmt::format("{} has {} elements for {} {}", section_name(id), array.size(), length, name);
+  });
+  return problem;
+}
 
 Problem first_of(std::initializer_list<Problem> problems) {
   for (const Problem& problem : problems) {
@@ -93,10 +93,7 @@ Problem check_surface(const LevelView& level) {
   if (level.face_specular.size() != level.face_roughness2.size()) {
     return "face_specular and face_roughness2 do not go together";
   }
-  const Group faces{"faces", face_count(level)};
-  return first_of({faces.check("face_sggx", level.face_sggx), faces.check("face_diffuse", level.face_diffuse),
-                   faces.check("face_specular", level.face_specular),
-                   faces.check("face_transmission", level.face_transmission)});
+  return check_lengths(level, SectionGroup::Faces, "faces", face_count(level));
 }
 
 // ---- volume ----
@@ -184,11 +181,7 @@ Problem check_volume(const LevelView& level) {
   if (level.voxel_specular.size() != level.voxel_roughness2.size()) {
     return "voxel_specular and voxel_roughness2 do not go together";
   }
-  const Group voxels{"voxels", voxel_count(level)};
-  return first_of({voxels.check("voxel_sggx", level.voxel_sggx), voxels.check("voxel_diffuse", level.voxel_diffuse),
-                   voxels.check("voxel_specular", level.voxel_specular),
-                   voxels.check("voxel_transmission", level.voxel_transmission),
-                   voxels.check("voxel_self_shadowing", level.voxel_self_shadowing)});
+  return check_lengths(level, SectionGroup::Voxels, "voxels", voxel_count(level));
 }
 
 // ---- values ----

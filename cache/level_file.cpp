@@ -6,11 +6,11 @@
 
 #include <array>
 #include <cerrno>
-#include <system_error>
 #include <vector>
 
 #include "base/file_io.h"
 #include "base/hash.h"
+#include "base/result.h"
 #include "cache/level_check.h"
 #include "cache/level_format.h"
 
@@ -96,23 +96,20 @@ LevelFileSizes level_file_sizes(const LevelView& level) {
 }
 
 Result<std::unique_ptr<LevelFile>> LevelFile::open(const std::filesystem::path& path, LevelCheck check) {
-  const Result<RegularFile> file = open_regular_file(path);
-  if (!file) return tl::unexpected(file.error());
-  if (file->bytes == 0) {
+  FARFIELD_TRY_LET(const auto file, open_regular_file(path));
+  if (file.bytes == 0) {
     return make_error(ErrorCode::BadFile,
                       fmt::format("broken level file {}: it is empty; bake the asset again", path.string()));
   }
-  void* map = ::mmap(nullptr, file->bytes, PROT_READ, MAP_PRIVATE, file->descriptor.get(), 0);
+  void* map = ::mmap(nullptr, file.bytes, PROT_READ, MAP_PRIVATE, file.descriptor.get(), 0);
   if (map == MAP_FAILED) {
-    return make_error(ErrorCode::Io, fmt::format("cannot map {}: {}", path.string(),
-                                                 std::error_code(errno, std::generic_category()).message()));
+    return make_error(ErrorCode::Io, fmt::format("cannot map {}: {}", path.string(), system_words(errno)));
   }
   std::unique_ptr<LevelFile> level(new LevelFile);  // owns the map from here on
   level->map_ = static_cast<const std::byte*>(map);
-  level->map_bytes_ = file->bytes;
-  Result<LevelView> view = parse_level({level->map_, level->map_bytes_}, check, path.string());
-  if (!view) return tl::unexpected(view.error());
-  level->view_ = *view;
+  level->map_bytes_ = file.bytes;
+  FARFIELD_TRY_LET(auto view, parse_level({level->map_, level->map_bytes_}, check, path.string()));
+  level->view_ = view;
   return level;
 }
 
@@ -130,9 +127,8 @@ void LevelFile::release_build_pages() const {
 }
 
 Result<uint64_t> hash_level_file(const std::filesystem::path& path) {
-  const auto file = LevelFile::open(path, LevelCheck::Structure);
-  if (!file) return tl::unexpected(file.error());
-  return hash_bytes((*file)->bytes());
+  FARFIELD_TRY_LET(const auto file, LevelFile::open(path, LevelCheck::Structure));
+  return hash_bytes(file->bytes());
 }
 
 }  // namespace farfield

@@ -191,42 +191,11 @@ class Parser {
 
 std::string_view section_name(SectionId id) {
   switch (id) {
-    case SectionId::Positions:
-      return "positions";
-    case SectionId::Quads:
-      return "quads";
-    case SectionId::QuadFirstFace:
-      return "quad_first_face";
-    case SectionId::FaceSggx:
-      return "face_sggx";
-    case SectionId::FaceDiffuse:
-      return "face_diffuse";
-    case SectionId::FaceSpecular:
-      return "face_specular";
-    case SectionId::FaceRoughness2:
-      return "face_roughness2";
-    case SectionId::FaceTransmission:
-      return "face_transmission";
-    case SectionId::BrickTable:
-      return "brick_table";
-    case SectionId::Bricks:
-      return "bricks";
-    case SectionId::VoxelSggx:
-      return "voxel_sggx";
-    case SectionId::VoxelDiffuse:
-      return "voxel_diffuse";
-    case SectionId::VoxelSpecular:
-      return "voxel_specular";
-    case SectionId::VoxelRoughness2:
-      return "voxel_roughness2";
-    case SectionId::VoxelTransmission:
-      return "voxel_transmission";
-    case SectionId::VoxelSelfShadowing:
-      return "voxel_self_shadowing";
-    case SectionId::MorphVertex:
-      return "morph_vertex";
-    case SectionId::MorphFace:
-      return "morph_face";
+#define FARFIELD_NAME(id, Name, field, Element, Group) \
+  case SectionId::Name:                                \
+    return #field;
+    FARFIELD_LEVEL_ARRAYS(FARFIELD_NAME)
+#undef FARFIELD_NAME
   }
   return "unknown";
 }

@@ -35,51 +35,31 @@ inline uint64_t round_up(uint64_t value, uint64_t multiple_of) {
   return (value + multiple_of - 1) / multiple_of * multiple_of;
 }
 
-/// Arrays of a level, in the order in which they lie in the file. Ids never change their meaning.
+/// What a section holds; see FARFIELD_LEVEL_ARRAYS.
 enum class SectionId : uint32_t {
-  Positions = 1,  // the first two are only read by BVH builds, the last two only by morphs: ends that can be given back
-  Quads = 2,
-  QuadFirstFace = 3,
-  FaceSggx = 4,
-  FaceDiffuse = 5,
-  FaceSpecular = 6,
-  FaceRoughness2 = 7,
-  FaceTransmission = 8,
-  BrickTable = 9,
-  Bricks = 10,
-  VoxelSggx = 11,
-  VoxelDiffuse = 12,
-  VoxelSpecular = 13,
-  VoxelRoughness2 = 14,
-  VoxelTransmission = 15,
-  VoxelSelfShadowing = 16,
-  MorphVertex = 17,
-  MorphFace = 18,
+#define FARFIELD_ID(id, Name, field, Element, Group) Name = id,
+  FARFIELD_LEVEL_ARRAYS(FARFIELD_ID)
+#undef FARFIELD_ID
 };
 /// "positions", "quads", ... as the fields of LevelArrays are called.
 std::string_view section_name(SectionId id);
 
-/// Calls visit(id, array) for every array of a level, in file order. Level: LevelData or LevelView, const or not.
+/// Which arrays have the same length.
+enum class SectionGroup { Vertices, Quads, Faces, BrickTable, Bricks, Voxels, MorphVertices, MorphFaces };
+
+/// Calls visit(id, group, array) for every array of a level, in file order. Level: LevelData or LevelView, const or
+/// not.
+template <typename Level, typename Visit>
+void for_each_grouped_section(Level& level, Visit&& visit) {
+#define FARFIELD_VISIT(id, Name, field, Element, Group) visit(SectionId::Name, SectionGroup::Group, level.field);
+  FARFIELD_LEVEL_ARRAYS(FARFIELD_VISIT)
+#undef FARFIELD_VISIT
+}
+
+/// The same with visit(id, array).
 template <typename Level, typename Visit>
 void for_each_section(Level& level, Visit&& visit) {
-  visit(SectionId::Positions, level.positions);
-  visit(SectionId::Quads, level.quads);
-  visit(SectionId::QuadFirstFace, level.quad_first_face);
-  visit(SectionId::FaceSggx, level.face_sggx);
-  visit(SectionId::FaceDiffuse, level.face_diffuse);
-  visit(SectionId::FaceSpecular, level.face_specular);
-  visit(SectionId::FaceRoughness2, level.face_roughness2);
-  visit(SectionId::FaceTransmission, level.face_transmission);
-  visit(SectionId::BrickTable, level.brick_table);
-  visit(SectionId::Bricks, level.bricks);
-  visit(SectionId::VoxelSggx, level.voxel_sggx);
-  visit(SectionId::VoxelDiffuse, level.voxel_diffuse);
-  visit(SectionId::VoxelSpecular, level.voxel_specular);
-  visit(SectionId::VoxelRoughness2, level.voxel_roughness2);
-  visit(SectionId::VoxelTransmission, level.voxel_transmission);
-  visit(SectionId::VoxelSelfShadowing, level.voxel_self_shadowing);
-  visit(SectionId::MorphVertex, level.morph_vertex);
-  visit(SectionId::MorphFace, level.morph_face);
+  for_each_grouped_section(level, [&](SectionId id, SectionGroup, auto& array) { visit(id, array); });
 }
 
 struct FileHeader {

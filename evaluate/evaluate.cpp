@@ -10,12 +10,13 @@
 
 #include "bake/bake.h"
 #include "base/hash.h"
+#include "base/result.h"
+#include "base/temporary_file.h"
 #include "cache/level_file.h"
 #include "evaluate/sheet.h"
 #include "evaluate/views.h"
 #include "path_tracer/asset_view.h"
 #include "path_tracer/environment.h"
-#include "path_tracer/temporary_file.h"
 
 namespace farfield {
 namespace {
@@ -45,9 +46,8 @@ Box3 in_source_space(const Box3& bounds, const Manifest& manifest) {
 /// What the level's pictures have to show: the level and its source. (The bounds of the whole asset are those of its
 /// root, which may be voxels wider.)
 Result<Box3> bounds_of(const EvaluateOptions& options, const Manifest& manifest, const LevelEntry& entry) {
-  const auto file = LevelFile::open(options.asset / entry.file, LevelCheck::Structure);
-  if (!file) return tl::unexpected(file.error());
-  return in_source_space((*file)->view().header.bounds, manifest);
+  FARFIELD_TRY_LET(const auto file, LevelFile::open(options.asset / entry.file, LevelCheck::Structure));
+  return in_source_space(file->view().header.bounds, manifest);
 }
 
 Result<std::vector<LevelPlan>> plan_evaluation(const Manifest& manifest, const Box3& source_bounds,
@@ -56,12 +56,11 @@ Result<std::vector<LevelPlan>> plan_evaluation(const Manifest& manifest, const B
   std::vector<LevelPlan> plans;
   for (const LevelEntry& entry : manifest.levels) {
     if (entry.level < options.first_level || entry.level > options.last_level) continue;
-    auto bounds = bounds_of(options, manifest, entry);
-    if (!bounds) return tl::unexpected(bounds.error());
-    bounds->extend(source_bounds);
+    FARFIELD_TRY_LET(auto bounds, bounds_of(options, manifest, entry));
+    bounds.extend(source_bounds);
     LevelPlan plan{entry, {}, 0, 0};
     for (const vec3& direction : view_directions(options.views)) {
-      const OrthoView view = frame_view(*bounds, direction, static_cast<float>(entry.resolution));
+      const OrthoView view = frame_view(bounds, direction, static_cast<float>(entry.resolution));
       const uint64_t pixels = static_cast<uint64_t>(view.width_px) * static_cast<uint64_t>(view.height_px);
       if (pixels > kMaxPicture)
         return make_error(ErrorCode::InvalidArgument,
@@ -86,16 +85,13 @@ Result<Manifest> bake_source(const EvaluateOptions& options, const fs::path& fol
   BakeOptions bake_options;
   bake_options.source_only = true;
   bake_options.import = options.import;
-  bake_options.cancel = options.cancel;
-  if (options.progress)
-    bake_options.progress = [&](const std::string&, double) { options.progress("importing the source", 0.0); };
-  auto report = bake(options.source, folder, bake_options);
-  if (!report) return tl::unexpected(report.error());
-  return std::move(report->manifest);
+  bake_options.job = options.job.step("importing the source", 0.0, 0.0);
+  FARFIELD_TRY_LET(auto report, bake(options.source, folder, bake_options));
+  return std::move(report.manifest);
 }
 
 Result<Parts> render_parts(const AssetView& asset, const OrthoView& view, int samples_per_pixel, uint64_t seed,
-                           const Lights& lights, const std::atomic<bool>* cancel) {
+                           const Lights& lights, const Job& job) {
   ViewOptions options;
   options.center = view.center;
   options.direction = view.direction;
@@ -107,9 +103,8 @@ Result<Parts> render_parts(const AssetView& asset, const OrthoView& view, int sa
   Parts parts;
   for (uint64_t render = 0; render < kParts / 2; ++render) {
     options.trace.seed = mix64(seed, render);
-    auto images = asset.render(options, lights, cancel);
-    if (!images) return tl::unexpected(images.error());
-    for (Image& half : images->half) parts.push_back(std::move(half));
+    FARFIELD_TRY_LET(auto images, asset.render(options, lights, job));
+    for (Image& half : images.half) parts.push_back(std::move(half));
   }
   return parts;
 }
@@ -187,36 +182,32 @@ class Evaluator {
 
   Result<Evaluation> run(const std::vector<LevelPlan>& plans) {
     for (const LevelPlan& plan : plans) total_cost_ += plan.cost();
-    if (auto written = prepare_images(); !written) return tl::unexpected(written.error());
+    FARFIELD_TRY(prepare_images());
     Evaluation evaluation;
     evaluation.views = options_.views;
     for (const LevelPlan& plan : plans) {
-      auto level = evaluate_level(plan);
-      if (!level) return tl::unexpected(level.error());
-      evaluation.levels.push_back(std::move(*level));
+      FARFIELD_TRY_LET(auto level, evaluate_level(plan));
+      evaluation.levels.push_back(std::move(level));
     }
-    if (!options_.sheet.empty())
-      if (auto written = write_png(options_.sheet, make_sheet(rows_)); !written) return tl::unexpected(written.error());
+    if (!options_.sheet.empty()) FARFIELD_TRY(write_png(options_.sheet, make_sheet(rows_)));
     return evaluation;
   }
 
  private:
   Result<void> prepare_images() const {
     if (options_.images.empty()) return {};
-    if (auto made = make_folder(options_.images); !made) return made;
+    FARFIELD_TRY(make_folder(options_.images));
     return write_exr(options_.images / "environment.exr", environment_image(lights_.environment), light_metadata_);
   }
 
   Result<LevelEvaluation> evaluate_level(const LevelPlan& plan) {
     const Clock::time_point start = Clock::now();
-    auto asset = AssetView::open(options_.asset, static_cast<float>(plan.entry.level));
-    if (!asset) return tl::unexpected(asset.error());
+    FARFIELD_TRY_LET(auto asset, AssetView::open(options_.asset, static_cast<float>(plan.entry.level)));
     ErrorAccumulator accumulator;
     for (size_t i = 0; i < plan.views.size(); ++i) {
-      if (options_.progress)
-        options_.progress(fmt::format("level {}, view {}/{}", plan.entry.level, i + 1, plan.views.size()),
-                          done_cost_ / total_cost_);
-      if (auto done = evaluate_view(plan, i, **asset, accumulator); !done) return tl::unexpected(done.error());
+      options_.job.report(done_cost_ / total_cost_,
+                          fmt::format("level {}, view {}/{}", plan.entry.level, i + 1, plan.views.size()));
+      FARFIELD_TRY(evaluate_view(plan, i, *asset, accumulator));
       done_cost_ += plan.cost() / static_cast<double>(plan.views.size());
     }
     LevelEvaluation level{plan.entry, accumulator.metrics(), plan.samples_per_pixel, plan.pixels, 0};
@@ -229,16 +220,16 @@ class Evaluator {
                              ErrorAccumulator& accumulator) {
     const OrthoView& view = plan.views[index];
     const uint64_t seed = mix64(mix64(options_.seed, plan.entry.level), 2 * index);
-    auto source = render_parts(source_, view, plan.samples_per_pixel, seed, lights_, options_.cancel);
-    if (!source) return tl::unexpected(source.error());
-    auto level = render_parts(asset, view, plan.samples_per_pixel, seed + 1, lights_, options_.cancel);
-    if (!level) return tl::unexpected(level.error());
-    if (auto added = accumulator.add_view(*source, *level); !added) return added;
+    FARFIELD_TRY_LET(auto source,
+                     render_parts(source_, view, plan.samples_per_pixel, seed, lights_, options_.job.quiet()));
+    FARFIELD_TRY_LET(auto level,
+                     render_parts(asset, view, plan.samples_per_pixel, seed + 1, lights_, options_.job.quiet()));
+    FARFIELD_TRY(accumulator.add_view(source, level));
 
     const bool in_sheet = !options_.sheet.empty() && index == 0;
     if (!in_sheet && options_.images.empty()) return {};
-    Image source_image = mean_image(*source), level_image = mean_image(*level);
-    if (auto written = write_images(plan, index, source_image, level_image); !written) return written;
+    Image source_image = mean_image(source), level_image = mean_image(level);
+    FARFIELD_TRY(write_images(plan, index, source_image, level_image));
     if (in_sheet) rows_.push_back({std::move(source_image), std::move(level_image), {}});
     return {};
   }
@@ -247,7 +238,7 @@ class Evaluator {
     if (options_.images.empty()) return {};
     const Metadata metadata = view_metadata(light_metadata_, plan, plan.views[index]);
     const std::string name = fmt::format("level_{:02}_view_{:02}_", plan.entry.level, index);
-    if (auto written = write_exr(options_.images / (name + "source.exr"), source, metadata); !written) return written;
+    FARFIELD_TRY(write_exr(options_.images / (name + "source.exr"), source, metadata));
     return write_exr(options_.images / (name + "level.exr"), level, metadata);
   }
 
@@ -262,14 +253,13 @@ class Evaluator {
 
 /// Puts the errors into the asset's manifest, where `farfield info` finds them.
 Result<void> record_errors(const fs::path& asset, const std::vector<LevelEvaluation>& levels) {
-  auto manifest = read_manifest(asset);
-  if (!manifest) return tl::unexpected(manifest.error());
+  FARFIELD_TRY_LET(auto manifest, read_manifest(asset));
   for (const LevelEvaluation& level : levels)
-    for (LevelEntry& entry : manifest->levels)
+    for (LevelEntry& entry : manifest.levels)
       if (entry.level == level.entry.level)
         entry.errors = LevelErrors{level.errors.occlusion_error.value, level.errors.occlusion_rms.value,
                                    level.errors.color_error.value};
-  return write_manifest(asset, *manifest);
+  return write_manifest(asset, manifest);
 }
 
 }  // namespace
@@ -283,28 +273,23 @@ int default_samples_per_pixel(uint64_t pixels) {
 Result<Evaluation> evaluate(const EvaluateOptions& options) {
   if (options.views < 1 || options.samples_per_pixel < 0)
     return make_error(ErrorCode::InvalidArgument, "evaluate needs at least one view and one sample per pixel");
-  auto manifest = read_manifest(options.asset);
-  if (!manifest) return tl::unexpected(manifest.error());
-  auto folder = TemporaryFolder::create();
-  if (!folder) return tl::unexpected(folder.error());
-  auto source_manifest = bake_source(options, folder->path());
-  if (!source_manifest) return tl::unexpected(source_manifest.error());
+  FARFIELD_TRY_LET(auto manifest, read_manifest(options.asset));
+  FARFIELD_TRY_LET(auto folder, TemporaryFolder::create());
+  FARFIELD_TRY_LET(auto source_manifest, bake_source(options, folder.path()));
 
-  auto plans = plan_evaluation(*manifest, in_source_space(source_manifest->bounds, *source_manifest), options);
-  if (!plans) return tl::unexpected(plans.error());
-  auto source = AssetView::open(folder->path(), 0.0f);
-  if (!source) return tl::unexpected(source.error());
+  FARFIELD_TRY_LET(auto plans,
+                   plan_evaluation(manifest, in_source_space(source_manifest.bounds, source_manifest), options));
+  FARFIELD_TRY_LET(auto source, AssetView::open(folder.path(), 0.0f));
 
-  auto evaluation = Evaluator(options, **source).run(*plans);
-  if (!evaluation) return evaluation;
-  if (source_manifest->source_hash != manifest->source_hash) {
-    evaluation->warnings.push_back(
+  FARFIELD_TRY_LET(auto evaluation, Evaluator(options, *source).run(plans));
+  if (source_manifest.source_hash != manifest.source_hash) {
+    evaluation.warnings.push_back(
         fmt::format("{}: was baked from a file that differs from {}; the errors are not recorded in the asset",
                     options.asset.string(), options.source.string()));
     return evaluation;
   }
-  if (auto recorded = record_errors(options.asset, evaluation->levels); !recorded)
-    evaluation->warnings.push_back(fmt::format("errors are not recorded in the asset: {}", recorded.error().message));
+  if (auto recorded = record_errors(options.asset, evaluation.levels); !recorded)
+    evaluation.warnings.push_back(fmt::format("errors are not recorded in the asset: {}", recorded.error().message));
   return evaluation;
 }
 

@@ -2,13 +2,12 @@
 // `farfield evaluate`: how far the levels of a baked asset look from their source (docs/error_metric.md).
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <vector>
 
+#include "base/job.h"
 #include "base/result.h"
 #include "cache/manifest.h"
 #include "evaluate/metrics.h"
@@ -29,8 +28,7 @@ struct EvaluateOptions {
   std::filesystem::path sheet;   ///< contact sheet, PNG; empty: none
 
   /// Called from one thread at a time with what is being done and how much of the whole is done, in [0, 1].
-  std::function<void(const std::string& stage, double done)> progress;
-  const std::atomic<bool>* cancel = nullptr;  ///< polled often; when true the evaluation stops with Cancelled
+  Job job;
 };
 
 struct LevelEvaluation {

@@ -12,6 +12,7 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "base/result.h"
 
 namespace farfield {
 namespace {
@@ -143,7 +144,7 @@ void ErrorAccumulator::add_subset(std::span<const Image> source, std::span<const
 }
 
 Result<void> ErrorAccumulator::add_view(std::span<const Image> source, std::span<const Image> level) {
-  if (auto checked = check_parts(source, level); !checked) return checked;
+  FARFIELD_TRY(check_parts(source, level));
   if (!sums_.empty() && sums_.size() != source.size() + 1)
     return make_error(ErrorCode::InvalidArgument, "every view needs the same number of parts");
   sums_.resize(source.size() + 1);

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "base/hash.h"
+#include "base/result.h"
 #include "import/read_file.h"
 
 namespace farfield {
@@ -259,23 +260,23 @@ Result<void> apply_sparse(const GltfDocument& document, const tinygltf::Accessor
   const int index_bytes = tinygltf::GetComponentSizeInBytes(static_cast<uint32_t>(sparse.indices.componentType));
   if (index_bytes <= 0) return document.bad(place + ": bad sparse index type");
   const auto count = static_cast<uint64_t>(sparse.count);
-  const auto indices = byte_range(document, sparse.indices.bufferView, static_cast<uint64_t>(sparse.indices.byteOffset),
-                                  count, static_cast<uint64_t>(index_bytes), place);
-  if (!indices) return tl::unexpected(indices.error());
-  const auto replaced = byte_range(document, sparse.values.bufferView, static_cast<uint64_t>(sparse.values.byteOffset),
-                                   count, component_bytes * static_cast<size_t>(components), place);
-  if (!replaced) return tl::unexpected(replaced.error());
+  FARFIELD_TRY_LET(const auto indices,
+                   byte_range(document, sparse.indices.bufferView, static_cast<uint64_t>(sparse.indices.byteOffset),
+                              count, static_cast<uint64_t>(index_bytes), place));
+  FARFIELD_TRY_LET(const auto replaced,
+                   byte_range(document, sparse.values.bufferView, static_cast<uint64_t>(sparse.values.byteOffset),
+                              count, component_bytes * static_cast<size_t>(components), place));
   for (uint64_t i = 0; i < count; ++i) {
     // Sparse index and value arrays are always tightly packed.
     const double target =
-        decode(indices->data + i * static_cast<uint64_t>(index_bytes), sparse.indices.componentType, false);
+        decode(indices.data + i * static_cast<uint64_t>(index_bytes), sparse.indices.componentType, false);
     if (!(target >= 0) || target >= static_cast<double>(accessor.count)) {
       return document.bad(fmt::format("{}: sparse index {} of {} elements", place, target, accessor.count));
     }
     for (int c = 0; c < components; ++c) {
       const size_t at = static_cast<size_t>(i) * static_cast<size_t>(components) + static_cast<size_t>(c);
       values[static_cast<size_t>(target) * static_cast<size_t>(components) + static_cast<size_t>(c)] =
-          decode(replaced->data + at * component_bytes, accessor.componentType, accessor.normalized);
+          decode(replaced.data + at * component_bytes, accessor.componentType, accessor.normalized);
     }
   }
   return {};
@@ -349,12 +350,12 @@ Result<std::vector<double>> read_accessor(const GltfDocument& document, int inde
   std::vector<double> values;
   if (accessor.bufferView >= 0 || !accessor.sparse.isSparse) {
     const size_t element = bytes * static_cast<size_t>(components);
-    const auto range = byte_range(document, accessor.bufferView, accessor.byteOffset, accessor.count, element, place);
-    if (!range) return tl::unexpected(range.error());
+    FARFIELD_TRY_LET(const auto range,
+                     byte_range(document, accessor.bufferView, accessor.byteOffset, accessor.count, element, place));
     values.resize(accessor.count * static_cast<size_t>(components));
     for (size_t i = 0, at = 0; i < accessor.count; ++i) {
       for (size_t c = 0; c < static_cast<size_t>(components); ++c, ++at) {
-        values[at] = decode(range->data + i * range->stride + c * bytes, accessor.componentType, accessor.normalized);
+        values[at] = decode(range.data + i * range.stride + c * bytes, accessor.componentType, accessor.normalized);
       }
     }
   } else {
@@ -364,8 +365,7 @@ Result<std::vector<double>> read_accessor(const GltfDocument& document, int inde
     values.resize(accessor.count * static_cast<size_t>(components));
   }
   if (accessor.sparse.isSparse) {
-    auto done = apply_sparse(document, accessor, place, components, bytes, values);
-    if (!done) return tl::unexpected(done.error());
+    FARFIELD_TRY(apply_sparse(document, accessor, place, components, bytes, values));
   }
   return values;
 }
@@ -376,9 +376,8 @@ Result<std::vector<uint32_t>> read_indices(const GltfDocument& document, int ind
                            accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT ||
                            accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
   if (!is_unsigned) return document.bad(fmt::format("accessor {}: indices have to be unsigned integers", index));
-  const auto values = read_accessor(document, index, 1);
-  if (!values) return tl::unexpected(values.error());
-  return std::vector<uint32_t>(values->begin(), values->end());
+  FARFIELD_TRY_LET(const auto values, read_accessor(document, index, 1));
+  return std::vector<uint32_t>(values.begin(), values.end());
 }
 
 Result<std::vector<unsigned char>> image_bytes(const GltfDocument& document, int index) {
@@ -387,9 +386,8 @@ Result<std::vector<unsigned char>> image_bytes(const GltfDocument& document, int
     const auto place = fmt::format("image {}", index);
     if (!is_index(image.bufferView, document.model.bufferViews)) return document.bad(place + ": no such buffer view");
     const size_t size = document.model.bufferViews[static_cast<size_t>(image.bufferView)].byteLength;
-    const auto range = byte_range(document, image.bufferView, 0, size, 1, place);
-    if (!range) return tl::unexpected(range.error());
-    return std::vector<unsigned char>(range->data, range->data + size);
+    FARFIELD_TRY_LET(const auto range, byte_range(document, image.bufferView, 0, size, 1, place));
+    return std::vector<unsigned char>(range.data, range.data + size);
   }
   if (image.image.empty()) {
     return make_error(ErrorCode::NotFound,

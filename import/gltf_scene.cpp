@@ -8,6 +8,7 @@
 #include <cctype>
 #include <set>
 
+#include "base/result.h"
 #include "import/gltf_document.h"
 #include "import/read_file.h"
 
@@ -133,14 +134,12 @@ class SceneReader {
   Result<GltfScene> read() {
     scene_.warnings = document_.warnings;
     for (size_t m = 0; m < model_.meshes.size(); ++m) {
-      auto done = read_mesh(m);
-      if (!done) return tl::unexpected(done.error());
+      FARFIELD_TRY(read_mesh(m));
     }
     const std::vector<int> order = scene_nodes(document_);
     flatten_nodes(order);
     for (const auto& animation : model_.animations) {
-      auto done = read_animation(animation);
-      if (!done) return tl::unexpected(done.error());
+      FARFIELD_TRY(read_animation(animation));
     }
     find_time_range();
     place_everything(order);
@@ -163,9 +162,8 @@ class SceneReader {
       const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
       if (mode < TINYGLTF_MODE_TRIANGLES) continue;  // points and lines
       mesh.triangle_count += mode == TINYGLTF_MODE_TRIANGLES ? count / 3 : std::max<uint64_t>(count, 2) - 2;
-      auto box = position_bounds(position->second);
-      if (!box) return tl::unexpected(box.error());
-      mesh.bounds.extend(*box);
+      FARFIELD_TRY_LET(auto box, position_bounds(position->second));
+      mesh.bounds.extend(box);
     }
     scene_.meshes.push_back(std::move(mesh));
     return {};
@@ -184,10 +182,9 @@ class SceneReader {
       if (is_finite(box.lower) && is_finite(box.upper)) return box;
       box = Box3();
     }
-    const auto values = read_accessor(document_, index, 3);
-    if (!values) return tl::unexpected(values.error());
-    for (size_t i = 0; i + 2 < values->size(); i += 3) {
-      const vec3 point((*values)[i], (*values)[i + 1], (*values)[i + 2]);
+    FARFIELD_TRY_LET(const auto values, read_accessor(document_, index, 3));
+    for (size_t i = 0; i + 2 < values.size(); i += 3) {
+      const vec3 point(values[i], values[i + 1], values[i + 2]);
       if (is_finite(point)) box.extend(point);
     }
     return box;
@@ -236,8 +233,7 @@ class SceneReader {
       if (source.target_node >= 0 && !has_node)
         return document_.bad(fmt::format("animation {}: no such node", animation.name));
       if (!has_node || scene_index_[static_cast<size_t>(source.target_node)] < 0) continue;  // not in this scene
-      auto done = read_channel(animation, source);
-      if (!done) return done;
+      FARFIELD_TRY(read_channel(animation, source));
     }
     return {};
   }
@@ -269,8 +265,7 @@ class SceneReader {
     channel.interpolation = sampler.interpolation == "STEP"          ? GltfChannel::Interpolation::Step
                             : sampler.interpolation == "CUBICSPLINE" ? GltfChannel::Interpolation::CubicSpline
                                                                      : GltfChannel::Interpolation::Linear;
-    auto done = read_keys(sampler, place, channel);
-    if (!done) return done;
+    FARFIELD_TRY(read_keys(sampler, place, channel));
     node.channels.push_back(static_cast<uint32_t>(scene_.channels.size()));
     scene_.channels.push_back(std::move(channel));
     return {};
@@ -283,24 +278,22 @@ class SceneReader {
       return document_.bad(place + ": no such accessor");
     }
     const int components = channel.path == GltfChannel::Path::Rotation ? 4 : 3;
-    const auto times = read_accessor(document_, sampler.input, 1);
-    if (!times) return tl::unexpected(times.error());
-    const auto values = read_accessor(document_, sampler.output, components);
-    if (!values) return tl::unexpected(values.error());
+    FARFIELD_TRY_LET(const auto times, read_accessor(document_, sampler.input, 1));
+    FARFIELD_TRY_LET(const auto values, read_accessor(document_, sampler.output, components));
 
     const size_t per_key = channel.interpolation == GltfChannel::Interpolation::CubicSpline ? 3 : 1;
-    if (times->empty() || values->size() != times->size() * per_key * static_cast<size_t>(components)) {
-      return document_.bad(fmt::format("{}: {} keys, but values for another number", place, times->size()));
+    if (times.empty() || values.size() != times.size() * per_key * static_cast<size_t>(components)) {
+      return document_.bad(fmt::format("{}: {} keys, but values for another number", place, times.size()));
     }
-    channel.times.assign(times->begin(), times->end());
+    channel.times.assign(times.begin(), times.end());
     for (size_t i = 0; i < channel.times.size(); ++i) {
       const bool is_good = std::isfinite(channel.times[i]) && (i == 0 || channel.times[i] > channel.times[i - 1]);
       if (!is_good) return document_.bad(fmt::format("{}: key times do not increase at key {}", place, i));
     }
-    for (size_t i = 0; i < values->size(); i += static_cast<size_t>(components)) {
+    for (size_t i = 0; i < values.size(); i += static_cast<size_t>(components)) {
       vec4 value(0.0f);
       for (int c = 0; c < components; ++c) {
-        value[c] = static_cast<float>((*values)[i + static_cast<size_t>(c)]);
+        value[c] = static_cast<float>(values[i + static_cast<size_t>(c)]);
         if (!std::isfinite(value[c])) return document_.bad(place + ": a key is not finite");
       }
       channel.values.push_back(value);
@@ -439,11 +432,9 @@ Box3 GltfScene::bounds_world() const {
 }
 
 Result<GltfScene> read_gltf_scene(const std::filesystem::path& path) {
-  const auto bytes = read_file(path);
-  if (!bytes) return tl::unexpected(bytes.error());
-  const auto document = open_gltf(*bytes, path);
-  if (!document) return tl::unexpected(document.error());
-  return SceneReader(*document).read();
+  FARFIELD_TRY_LET(const auto bytes, read_file(path));
+  FARFIELD_TRY_LET(const auto document, open_gltf(bytes, path));
+  return SceneReader(document).read();
 }
 
 }  // namespace farfield

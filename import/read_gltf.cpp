@@ -7,6 +7,7 @@
 #include <map>
 
 #include "base/hash.h"
+#include "base/result.h"
 #include "import/gltf_document.h"
 #include "import/read_formats.h"
 
@@ -246,8 +247,7 @@ class GltfMeshReader {
   Result<SourceMesh> read(int mesh) {
     mesh_.warnings = document_.warnings;
     mesh_.dependency_hash = document_.dependency_hash;
-    auto done = mesh >= 0 ? read_one(mesh) : read_scene();
-    if (!done) return tl::unexpected(done.error());
+    FARFIELD_TRY(mesh >= 0 ? read_one(mesh) : read_scene());
     if (!mesh_.corner_uv.empty()) mesh_.corner_uv.resize(mesh_.corner_count(), no_uv());
     if (!mesh_.corner_color.empty()) mesh_.corner_color.resize(mesh_.corner_count(), vec4(1.0f));
     return std::move(mesh_);
@@ -308,9 +308,8 @@ class GltfMeshReader {
                                           const std::string& place) {
     std::vector<uint32_t> indices;
     if (primitive.indices >= 0) {
-      auto read = read_indices(document_, primitive.indices);
-      if (!read) return tl::unexpected(read.error());
-      indices = std::move(*read);
+      FARFIELD_TRY_LET(auto read, read_indices(document_, primitive.indices));
+      indices = std::move(read);
       for (const uint32_t index : indices) {
         if (index >= vertex_count) {
           return document_.bad(fmt::format("{}: vertex index {}, there are {} vertices", place, index, vertex_count));
@@ -339,12 +338,10 @@ class GltfMeshReader {
                         fmt::format("{}: {}: positions are compressed (Draco or meshopt); export without compression",
                                     document_.name, place));
     }
-    const auto points = read_accessor(document_, position->second, 3);
-    if (!points) return tl::unexpected(points.error());
-    const size_t vertex_count = points->size() / 3;
-    const auto triangles = triangles_of(primitive, vertex_count, mode, place);
-    if (!triangles) return tl::unexpected(triangles.error());
-    if (mesh_.face_count() + triangles->size() > kMaxTriangles) {
+    FARFIELD_TRY_LET(const auto points, read_accessor(document_, position->second, 3));
+    const size_t vertex_count = points.size() / 3;
+    FARFIELD_TRY_LET(const auto triangles, triangles_of(primitive, vertex_count, mode, place));
+    if (mesh_.face_count() + triangles.size() > kMaxTriangles) {
       return make_error(ErrorCode::Unsupported,
                         fmt::format("{}: more than {} triangles with all instances; take its meshes one by one",
                                     document_.name, kMaxTriangles));
@@ -352,18 +349,18 @@ class GltfMeshReader {
 
     const auto base = static_cast<uint32_t>(mesh_.positions.size());
     for (size_t v = 0; v < vertex_count; ++v) {
-      const glm::dvec4 p((*points)[3 * v], (*points)[3 * v + 1], (*points)[3 * v + 2], 1);
+      const glm::dvec4 p(points[3 * v], points[3 * v + 1], points[3 * v + 2], 1);
       mesh_.positions.emplace_back(to_world * p);
     }
     const uint32_t material = materials_.find(primitive.material);
     const size_t first_corner = mesh_.corner_count();
-    for (const uvec3& t : *triangles) {
+    for (const uvec3& t : triangles) {
       for (int k = 0; k < 3; ++k) mesh_.corner_position.push_back(base + t[k]);
       mesh_.face_begin.push_back(static_cast<uint32_t>(mesh_.corner_count()));
       mesh_.face_material.push_back(material);
     }
-    if (auto done = add_uvs(primitive, *triangles, material, vertex_count, first_corner, place); !done) return done;
-    return add_colors(primitive, *triangles, vertex_count, first_corner, place);
+    FARFIELD_TRY(add_uvs(primitive, triangles, material, vertex_count, first_corner, place));
+    return add_colors(primitive, triangles, vertex_count, first_corner, place);
   }
 
   Result<void> add_uvs(const tinygltf::Primitive& primitive, const std::vector<uvec3>& triangles, uint32_t material,
@@ -376,12 +373,11 @@ class GltfMeshReader {
       mesh_.warnings.push_back(fmt::format("{}: textured, but without texture coordinates; the mean is used", place));
       return {};
     }
-    const auto values = read_accessor(document_, attribute->second, 2);
-    if (!values) return tl::unexpected(values.error());
-    if (values->size() / 2 < vertex_count) return document_.bad(place + ": fewer texture coordinates than vertices");
+    FARFIELD_TRY_LET(const auto values, read_accessor(document_, attribute->second, 2));
+    if (values.size() / 2 < vertex_count) return document_.bad(place + ": fewer texture coordinates than vertices");
     mesh_.corner_uv.resize(first_corner, no_uv());
     for (const uvec3& t : triangles) {
-      for (int k = 0; k < 3; ++k) mesh_.corner_uv.push_back(source.apply((*values)[2 * t[k]], (*values)[2 * t[k] + 1]));
+      for (int k = 0; k < 3; ++k) mesh_.corner_uv.push_back(source.apply(values[2 * t[k]], values[2 * t[k] + 1]));
     }
     return {};
   }
@@ -393,9 +389,8 @@ class GltfMeshReader {
     if (attribute == primitive.attributes.end()) return {};
     const int components = component_count(document_, attribute->second);
     if (components != 3 && components != 4) return document_.bad(place + ": COLOR_0 is neither RGB nor RGBA");
-    const auto values = read_accessor(document_, attribute->second, components);
-    if (!values) return tl::unexpected(values.error());
-    if (values->size() / static_cast<size_t>(components) < vertex_count) {
+    FARFIELD_TRY_LET(const auto values, read_accessor(document_, attribute->second, components));
+    if (values.size() / static_cast<size_t>(components) < vertex_count) {
       return document_.bad(place + ": fewer colours than vertices");
     }
     mesh_.corner_color.resize(first_corner, vec4(1.0f));
@@ -403,7 +398,7 @@ class GltfMeshReader {
       for (int k = 0; k < 3; ++k) {
         vec4 color(1.0f);
         for (int c = 0; c < components; ++c) {
-          color[c] = unit((*values)[static_cast<size_t>(components) * t[k] + static_cast<size_t>(c)]);
+          color[c] = unit(values[static_cast<size_t>(components) * t[k] + static_cast<size_t>(c)]);
         }
         mesh_.corner_color.push_back(color);
       }
@@ -420,9 +415,8 @@ class GltfMeshReader {
 }  // namespace
 
 Result<SourceMesh> read_gltf(std::span<const unsigned char> bytes, const std::filesystem::path& path, int mesh) {
-  const auto document = open_gltf(bytes, path);
-  if (!document) return tl::unexpected(document.error());
-  return GltfMeshReader(*document).read(mesh);
+  FARFIELD_TRY_LET(const auto document, open_gltf(bytes, path));
+  return GltfMeshReader(document).read(mesh);
 }
 
 }  // namespace farfield

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <optional>
 
+#include "base/result.h"
 #include "import/read_formats.h"
 #include "import/text_cursor.h"
 
@@ -125,12 +126,10 @@ class PlyReader {
 
   Result<SourceMesh> read() {
     size_t body = 0;
-    auto header = read_header(body);
-    if (!header) return tl::unexpected(header.error());
-    ValueReader values(data_.substr(body), header->encoding);
-    for (const Element& element : header->elements) {
-      auto done = read_element(element, values);
-      if (!done) return tl::unexpected(done.error());
+    FARFIELD_TRY_LET(auto header, read_header(body));
+    ValueReader values(data_.substr(body), header.encoding);
+    for (const Element& element : header.elements) {
+      FARFIELD_TRY(read_element(element, values));
     }
     return finish();
   }

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "base/hash.h"
+#include "base/result.h"
 #include "import/read_file.h"
 #include "import/read_formats.h"
 
@@ -54,12 +55,10 @@ Result<SourceMesh> read_as_named(const Bytes& bytes, const fs::path& path, const
 }  // namespace
 
 Result<SourceMesh> read_source(const fs::path& path, const ImportOptions& options) {
-  const auto bytes = read_file(path);
-  if (!bytes) return tl::unexpected(bytes.error());
-  auto mesh = read_as_named(*bytes, path, options);
-  if (!mesh) return mesh;
-  const uint64_t contents = mix64(hash_values<unsigned char>(*bytes), mesh->dependency_hash);
-  mesh->source_hash = mix64(contents, static_cast<uint64_t>(options.mesh));
+  FARFIELD_TRY_LET(const auto bytes, read_file(path));
+  FARFIELD_TRY_LET(auto mesh, read_as_named(bytes, path, options));
+  const uint64_t contents = mix64(hash_values<unsigned char>(bytes), mesh.dependency_hash);
+  mesh.source_hash = mix64(contents, static_cast<uint64_t>(options.mesh));
   return mesh;
 }
 

@@ -31,10 +31,10 @@ float lambda_of_footprint(float footprint, float base_resolution, int coarsest_l
   return std::clamp(lambda, 0.0f, static_cast<float>(std::max(coarsest_level, 0)));
 }
 
-float finest_footprint(std::span<const FootprintCamera> cameras, const Box3& bounds_world) {
+float finest_footprint(std::span<const TessellationCamera> cameras, const Box3& bounds_world) {
   float finest = std::numeric_limits<float>::infinity();
   if (bounds_world.is_empty()) return finest;
-  for (const FootprintCamera& camera : cameras) {
+  for (const TessellationCamera& camera : cameras) {
     const double footprint = camera.pixel_width + camera.pixel_spread * distance_to(bounds_world, camera.position);
     if (std::isnan(footprint)) return 0.0f;
     finest = std::min(finest, static_cast<float>(footprint));

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "base/vec.h"
+#include "farfield/camera.h"
 
 namespace farfield {
 
@@ -16,20 +17,12 @@ struct RayCone {
   float diameter(float t) const { return width + spread * t; }
 };
 
-/// A camera, reduced to what fixes footprints: at distance d a pixel is pixel_width + pixel_spread * d wide.
-/// Perspective: width 0, spread 2 tan(fov_y / 2) / height. Orthographic: width = view height / height, spread 0.
-struct FootprintCamera {
-  vec3 position{0.0f};
-  float pixel_width = 0;
-  float pixel_spread = 0;
-};
-
 /// lambda = log2(footprint / base_resolution), clamped to [0, coarsest_level]. Footprint 0 (or NaN) gives 0, infinity
 /// gives the coarsest level. Monotone in the footprint.
 float lambda_of_footprint(float footprint, float base_resolution, int coarsest_level);
 
 /// The finest (smallest) footprint that any of the cameras has on a box: at the box's nearest point. World space.
-float finest_footprint(std::span<const FootprintCamera> cameras, const Box3& bounds_world);
+float finest_footprint(std::span<const TessellationCamera> cameras, const Box3& bounds_world);
 
 /// The two levels a lambda lies between and where: level = floor(lambda), blend = lambda - level in [0, 1).
 struct LevelBlend {

@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "base/parallel.h"
+#include "base/result.h"
 #include "cache/manifest.h"
 
 namespace farfield {
@@ -25,10 +26,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::chrono::milliseconds kPollInterval{10};
-
-bool is_cancelled(const RenderOptions& options) {
-  return options.cancel != nullptr && options.cancel->load(std::memory_order_relaxed);
-}
 
 // "forest" for forest.glb, forest.gltf, forest.glb.gz.
 std::string scene_name(const fs::path& scene) {
@@ -65,7 +62,7 @@ Result<int> wait_for(pid_t child, const RenderOptions& options) {
       if (asked_to_stop) return make_error(ErrorCode::Cancelled, "cancelled");
       return status;
     }
-    if (!asked_to_stop && is_cancelled(options)) {
+    if (!asked_to_stop && options.job.is_cancelled()) {
       kill(child, SIGTERM);
       asked_to_stop = true;
     }
@@ -98,14 +95,12 @@ std::vector<std::string> bake_command(const RenderOptions& options, size_t mesh,
 
 // The bake itself finds out whether the folder is up to date, and then does nothing.
 Result<void> bake_mesh(const GltfScene& scene, const RenderOptions& options, size_t mesh, const fs::path& folder) {
-  const auto child = start(bake_command(options, mesh, folder));
-  if (!child) return tl::unexpected(child.error());
-  const auto status = wait_for(*child, options);
-  if (!status) return tl::unexpected(status.error());
-  if (WIFEXITED(*status) && WEXITSTATUS(*status) == 0) return {};
-  if (is_cancelled(options)) return make_error(ErrorCode::Cancelled, "cancelled");
-  const std::string how = WIFSIGNALED(*status) ? fmt::format("signal {}", WTERMSIG(*status))
-                                               : fmt::format("exit code {}", WEXITSTATUS(*status));
+  FARFIELD_TRY_LET(const auto child, start(bake_command(options, mesh, folder)));
+  FARFIELD_TRY_LET(const auto status, wait_for(child, options));
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
+  if (options.job.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
+  const std::string how = WIFSIGNALED(status) ? fmt::format("signal {}", WTERMSIG(status))
+                                              : fmt::format("exit code {}", WEXITSTATUS(status));
   return make_error(ErrorCode::BadFile, fmt::format("{}: baking mesh {} \"{}\" failed ({})", options.scene.string(),
                                                     mesh, scene.meshes[mesh].name, how));
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "path_tracer/asset_view.h"
 
+#include "base/result.h"
 #include "path_tracer/camera.h"
 #include "path_tracer/embree_handles.h"
 
@@ -20,27 +21,22 @@ Result<std::unique_ptr<AssetView>> AssetView::open(const std::filesystem::path& 
                                                    uint64_t budget_bytes) {
   std::unique_ptr<AssetView> view(new AssetView);
   Impl& impl = *view->impl_;
-  auto device = make_device();
-  if (!device) return tl::unexpected(device.error());
-  impl.device = std::move(*device);
+  FARFIELD_TRY_LET(auto device, make_device());
+  impl.device = std::move(device);
 
   RuntimeOptions options;
   options.budget_bytes = budget_bytes;
   options.forced_lambda = lambda;
-  auto runtime = Runtime::create(impl.device.get(), options);
-  if (!runtime) return tl::unexpected(runtime.error());
-  impl.runtime = std::move(*runtime);
+  FARFIELD_TRY_LET(auto runtime, Runtime::create(impl.device.get(), options));
+  impl.runtime = std::move(runtime);
 
-  const auto asset = impl.runtime->open_asset(folder.string());
-  if (!asset) return tl::unexpected(asset.error());
-  impl.asset = *asset;
-  if (auto instance = impl.runtime->add_instance(*asset, mat4x3(1.0f)); !instance)
-    return tl::unexpected(instance.error());
-  if (auto plan = impl.runtime->plan_frame(); !plan) return tl::unexpected(plan.error());
+  FARFIELD_TRY_LET(const auto asset, impl.runtime->open_asset(folder.string()));
+  impl.asset = asset;
+  FARFIELD_TRY(impl.runtime->add_instance(asset, mat4x3(1.0f)));
+  FARFIELD_TRY(impl.runtime->plan_frame());
 
-  auto scene = make_scene(impl.device, *impl.runtime);
-  if (!scene) return tl::unexpected(scene.error());
-  impl.scene = std::move(*scene);
+  FARFIELD_TRY_LET(auto scene, make_scene(impl.device, *impl.runtime));
+  impl.scene = std::move(scene);
   return view;
 }
 
@@ -54,8 +50,7 @@ const std::vector<LevelInfo>& AssetView::levels() const { return impl_->runtime-
 
 Stats AssetView::stats() const { return impl_->runtime->stats(); }
 
-Result<ViewImages> AssetView::render(const ViewOptions& options, const Lights& lights,
-                                     const std::atomic<bool>* cancel) const {
+Result<ViewImages> AssetView::render(const ViewOptions& options, const Lights& lights, const Job& job) const {
   // Rays start outside of the asset, however far from its middle the view's centre is.
   const Box3 box = bounds();
   const float distance = glm::length(box.size()) + glm::length(options.center - box.center());
@@ -66,7 +61,7 @@ Result<ViewImages> AssetView::render(const ViewOptions& options, const Lights& l
   trace.transparent = true;
   Film film(options.width, options.height, true);
   const TraceScene scene{impl_->scene.get(), impl_->runtime.get(), &lights};
-  if (auto traced = path_trace(scene, camera, trace, film, {}, cancel); !traced) return tl::unexpected(traced.error());
+  FARFIELD_TRY(path_trace(scene, camera, trace, film, job));
   return ViewImages{select_channels(film.image(), {"R", "G", "B", "A"}), {film.half(0), film.half(1)}};
 }
 

@@ -51,8 +51,7 @@ class AssetView {
   const std::vector<LevelInfo>& levels() const;
   Stats stats() const;
   /// Errors: those of path_trace.
-  Result<ViewImages> render(const ViewOptions& options, const Lights& lights,
-                            const std::atomic<bool>* cancel = nullptr) const;
+  Result<ViewImages> render(const ViewOptions& options, const Lights& lights, const Job& job = {}) const;
 
  private:
   AssetView();

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "base/parallel.h"
+#include "base/result.h"
 
 namespace farfield {
 
@@ -16,7 +17,7 @@ Result<DeviceHandle> make_device() {
 
 Result<SceneHandle> make_scene(const DeviceHandle& device, Runtime& runtime) {
   SceneHandle scene(rtcNewScene(device.get()));
-  if (auto attached = runtime.attach(scene.get()); !attached) return tl::unexpected(attached.error());
+  FARFIELD_TRY(runtime.attach(scene.get()));
   rtcCommitScene(scene.get());
   if (const RTCError error = rtcGetDeviceError(device.get()); error != RTC_ERROR_NONE)
     return make_error(ErrorCode::Io, fmt::format("Embree cannot build the scene (error {})", static_cast<int>(error)));

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "base/result.h"
 #include "path_tracer/lat_long.h"
 #include "path_tracer/preetham_sky.h"
 
@@ -175,9 +176,8 @@ Result<Environment> Environment::from_image(const Image& image, float scale) {
 }
 
 Result<Environment> Environment::from_exr(const std::filesystem::path& path, float scale) {
-  const auto file = read_exr(path);
-  if (!file) return tl::unexpected(file.error());
-  auto environment = from_image(file->image, scale);
+  FARFIELD_TRY_LET(const auto file, read_exr(path));
+  auto environment = from_image(file.image, scale);
   if (!environment)
     return make_error(environment.error().code, fmt::format("{}: {}", path.string(), environment.error().message));
   return environment;

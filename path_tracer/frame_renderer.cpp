@@ -9,6 +9,7 @@
 
 #include "base/file_io.h"
 #include "base/hash.h"
+#include "base/result.h"
 #include "path_tracer/asset_library.h"
 #include "path_tracer/film.h"
 #include "path_tracer/process_memory.h"
@@ -93,31 +94,27 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOption
   std::unique_ptr<FrameRenderer> renderer(new FrameRenderer);
   renderer->options_ = options;
 
-  auto scene = read_gltf_scene(options.scene);
-  if (!scene) return tl::unexpected(scene.error());
-  std::vector<std::string> warnings = scene->warnings;
-  auto lights = make_lights(*scene, options, warnings);
-  if (!lights) return tl::unexpected(lights.error());
+  FARFIELD_TRY_LET(auto scene, read_gltf_scene(options.scene));
+  std::vector<std::string> warnings = scene.warnings;
+  FARFIELD_TRY_LET(auto lights, make_lights(scene, options, warnings));
   if (options.message)
     for (const std::string& warning : warnings) options.message("warning: " + warning);
 
-  auto folders = find_or_bake_assets(*scene, options);
-  if (!folders) return tl::unexpected(folders.error());
-  for (size_t mesh = 0; mesh < folders->size(); ++mesh)
-    if (!(*folders)[mesh].empty()) renderer->asset_names_.push_back(scene->meshes[mesh].asset_name);
-  renderer->fingerprint_ = make_fingerprint(options, *folders);
-  renderer->scene_ = std::move(*scene);
-  renderer->lights_ = std::move(*lights);
-  renderer->asset_folders_ = std::move(*folders);
+  FARFIELD_TRY_LET(auto folders, find_or_bake_assets(scene, options));
+  for (size_t mesh = 0; mesh < folders.size(); ++mesh)
+    if (!folders[mesh].empty()) renderer->asset_names_.push_back(scene.meshes[mesh].asset_name);
+  renderer->fingerprint_ = make_fingerprint(options, folders);
+  renderer->scene_ = std::move(scene);
+  renderer->lights_ = std::move(lights);
+  renderer->asset_folders_ = std::move(folders);
   return renderer;
 }
 
 Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const FrameSink& sink) {
   // Everything of ours first, assets last: see warm_up.h.
   Film film(options_.width, options_.height);
-  auto device = make_device();
-  if (!device) return tl::unexpected(device.error());
-  if (auto warm = warm_up(*device, film.image()); !warm) return tl::unexpected(warm.error());
+  FARFIELD_TRY_LET(auto device, make_device());
+  FARFIELD_TRY(warm_up(device, film.image()));
 
   RenderReport report;
   report.assets = asset_names_;
@@ -132,23 +129,21 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     std::vector<GltfInstance> instances = scene_.instances_at(seconds);
     if (!session || !same_places(instances, session_instances)) {
       session.reset();  // before the next one, so that two never share the budget
-      auto opened = RenderSession::open(*device, options_, asset_folders_, instances);
-      if (!opened) return tl::unexpected(opened.error());
-      session = std::move(*opened);
+      FARFIELD_TRY_LET(auto opened, RenderSession::open(device, options_, asset_folders_, instances));
+      session = std::move(opened);
       session_instances = std::move(instances);
     }
 
     const Camera camera = make_camera(scene_, seconds, options_.width, options_.height);
-    const auto progress = [&](double done) {
-      if (!options_.progress) return;
-      options_.progress((static_cast<double>(i) + done) / static_cast<double>(frames.size()),
-                        fmt::format("frame {} ({}/{})", frames[i], i + 1, frames.size()));
+    const auto done_after = [&](size_t count) {
+      return static_cast<double>(count) / static_cast<double>(frames.size());
     };
-    auto frame = session->render(camera, lights_, options_, film, progress);
-    if (!frame) return tl::unexpected(frame.error());
-    frame->frame = frames[i];
-    report_problems(options_, *frame);
-    report.frames.push_back(std::move(*frame));
+    const Job job = options_.job.step(fmt::format("frame {} ({}/{})", frames[i], i + 1, frames.size()), done_after(i),
+                                      done_after(i + 1));
+    FARFIELD_TRY_LET(auto frame, session->render(camera, lights_, options_, film, job));
+    frame.frame = frames[i];
+    report_problems(options_, frame);
+    report.frames.push_back(std::move(frame));
     report.peak_accounted_bytes = std::max(report.peak_accounted_bytes, session->stats().peak_accounted_bytes);
     report.peak_rss_bytes = memory.peak_bytes();
     if (auto taken = sink(film.image(), frame_metadata(options_, camera, frames[i]), report); !taken)

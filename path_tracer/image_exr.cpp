@@ -18,8 +18,8 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "base/temporary_file.h"
 #include "path_tracer/image.h"
-#include "path_tracer/temporary_file.h"
 
 namespace farfield {
 
@@ -37,7 +37,9 @@ constexpr std::array kFormatAttributes = {
 class ExrStream : public Imf::OStream {
  public:
   ExrStream(TemporaryFile& file, const std::filesystem::path& name) : OStream(name.c_str()), file_(file) {}
-  void write(const char* data, int bytes) override { check(file_.write(data, static_cast<size_t>(bytes))); }
+  void write(const char* data, int bytes) override {
+    check(file_.write(std::as_bytes(std::span(data, static_cast<size_t>(bytes)))));
+  }
   uint64_t tellp() override { return file_.position(); }
   void seekp(uint64_t position) override { check(file_.seek(position)); }
 

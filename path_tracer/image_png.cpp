@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/temporary_file.h"
 #include "path_tracer/image.h"
-#include "path_tracer/temporary_file.h"
 
 namespace farfield {
 
@@ -26,7 +26,9 @@ class PngStream : public OIIO::Filesystem::IOProxy {
  public:
   PngStream(TemporaryFile& file, const std::filesystem::path& name) : IOProxy(name.string(), Write), file_(file) {}
   const char* proxytype() const override { return "file"; }
-  size_t write(const void* data, size_t bytes) override { return file_.write(data, bytes) ? bytes : 0; }
+  size_t write(const void* data, size_t bytes) override {
+    return file_.write({static_cast<const std::byte*>(data), bytes}) ? bytes : 0;
+  }
   bool seek(int64_t position) override { return file_.seek(static_cast<uint64_t>(position)); }
   int64_t tell() override { return static_cast<int64_t>(file_.position()); }
 

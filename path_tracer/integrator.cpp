@@ -283,7 +283,7 @@ float spot_falloff(const PointLight& light, const vec3& direction) {
 }
 
 Result<TraceStats> path_trace(const TraceScene& scene, const Camera& camera, const TraceOptions& options, Film& film,
-                              const std::function<void(double done)>& progress, const std::atomic<bool>* cancel) {
+                              const Job& job) {
   if (camera.width() != film.width() || camera.height() != film.height())
     return make_error(ErrorCode::InvalidArgument, "camera and film differ in size");
   if (options.samples_per_pixel < 1 || options.max_depth < 0)
@@ -294,16 +294,15 @@ Result<TraceStats> path_trace(const TraceScene& scene, const Camera& camera, con
   const auto tile_count = static_cast<size_t>(columns) * static_cast<size_t>(rows);
   // Only counters: nothing else is published through them.
   std::atomic<uint64_t> rays{0}, invalid_samples{0}, tiles_done{0};
-  const auto is_cancelled = [&] { return cancel != nullptr && cancel->load(std::memory_order_relaxed); };
 
   parallel_for(tile_count, 1, [&](size_t begin, size_t end) {
-    for (size_t tile = begin; tile < end && !is_cancelled(); ++tile) {
+    for (size_t tile = begin; tile < end && !job.is_cancelled(); ++tile) {
       PathTracer tracer(scene, options);
       trace_tile(tracer, camera, options, static_cast<int>(tile) % columns, static_cast<int>(tile) / columns, film);
       rays += tracer.stats.rays;
       invalid_samples += tracer.stats.invalid_samples;
       const uint64_t done = ++tiles_done;
-      if (progress) progress(static_cast<double>(done) / static_cast<double>(tile_count));
+      job.report(static_cast<double>(done) / static_cast<double>(tile_count), "render");
     }
   });
   if (tiles_done < tile_count) return make_error(ErrorCode::Cancelled, "cancelled");

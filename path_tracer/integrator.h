@@ -4,11 +4,10 @@
 
 #include <embree3/rtcore.h>
 
-#include <atomic>
 #include <cstdint>
-#include <functional>
 #include <vector>
 
+#include "base/job.h"
 #include "base/result.h"
 #include "farfield/runtime.h"
 #include "path_tracer/camera.h"
@@ -64,11 +63,9 @@ struct TraceStats {
 };
 
 /// Renders `camera` into `film` (same size) on all threads of parallel_for. The image depends on the arguments alone,
-/// not on threads or time. progress (may be empty) is called with the fraction done, in (0, 1], from several threads at
-/// once; cancel (may be null) is polled for each tile of 16 x 16 pixels. Errors: Cancelled (the film is part done);
-/// InvalidArgument (sizes differ, no samples).
+/// not on threads or time. The job reports from several threads at once and is polled for each tile of 16 x 16 pixels.
+/// Errors: Cancelled (the film is part done); InvalidArgument (sizes differ, no samples).
 Result<TraceStats> path_trace(const TraceScene& scene, const Camera& camera, const TraceOptions& options, Film& film,
-                              const std::function<void(double done)>& progress = {},
-                              const std::atomic<bool>* cancel = nullptr);
+                              const Job& job = {});
 
 }  // namespace farfield

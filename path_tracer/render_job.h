@@ -2,7 +2,6 @@
 // `farfield render`: one frame of a glTF scene.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -10,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/job.h"
 #include "base/result.h"
 #include "farfield/runtime.h"
 #include "path_tracer/integrator.h"
@@ -33,10 +33,8 @@ struct RenderOptions {
   uint32_t finest_grid = 512;         ///< of assets that have to be baked first
   /// Command that bakes: called as BAKER bake SCENE -o DIR --mesh N ... Empty: this very program.
   std::filesystem::path baker;
-  /// Messages for a person, one line each, and how far the whole job is; from any thread. May be empty.
-  std::function<void(const std::string& line)> message;
-  std::function<void(double done, const std::string& what)> progress;
-  const std::atomic<bool>* cancel = nullptr;
+  std::function<void(const std::string& line)> message;  ///< for a person, one line each; from any thread. May be empty
+  Job job;                                               ///< reports from any thread
 };
 
 /// What a frame took. Bytes are the process's and the budget's; see ShotReport.

@@ -3,6 +3,7 @@
 
 #include <chrono>
 
+#include "base/result.h"
 #include "path_tracer/process_memory.h"
 
 namespace farfield {
@@ -27,40 +28,35 @@ Result<std::unique_ptr<RenderSession>> RenderSession::open(const DeviceHandle& d
                                                            std::span<const std::filesystem::path> folders,
                                                            std::span<const GltfInstance> instances) {
   std::unique_ptr<RenderSession> session(new RenderSession);
-  auto runtime = Runtime::create(device.get(), runtime_options(options));
-  if (!runtime) return tl::unexpected(runtime.error());
-  session->runtime_ = std::move(*runtime);
+  FARFIELD_TRY_LET(auto runtime, Runtime::create(device.get(), runtime_options(options)));
+  session->runtime_ = std::move(runtime);
 
   std::vector<AssetId> assets(folders.size());
   for (size_t mesh = 0; mesh < folders.size(); ++mesh) {
     if (folders[mesh].empty()) continue;
-    const auto asset = session->runtime_->open_asset(folders[mesh].string());
-    if (!asset) return tl::unexpected(asset.error());
-    assets[mesh] = *asset;
+    FARFIELD_TRY_LET(const auto asset, session->runtime_->open_asset(folders[mesh].string()));
+    assets[mesh] = asset;
   }
   for (const GltfInstance& instance : instances) {
     if (folders[instance.mesh].empty()) continue;
     if (auto added = session->runtime_->add_instance(assets[instance.mesh], instance.to_world); !added)
       return tl::unexpected(added.error());
   }
-  auto scene = make_scene(device, *session->runtime_);
-  if (!scene) return tl::unexpected(scene.error());
-  session->scene_ = std::move(*scene);
+  FARFIELD_TRY_LET(auto scene, make_scene(device, *session->runtime_));
+  session->scene_ = std::move(scene);
   return session;
 }
 
 Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& lights, const RenderOptions& options,
-                                          Film& film, const std::function<void(double done)>& done) {
+                                          Film& film, const Job& job) {
   const auto start = std::chrono::steady_clock::now();
   const Stats before = runtime_->stats();
   runtime_->set_cameras({camera.tessellation()});
-  auto plan = runtime_->plan_frame();
-  if (!plan) return tl::unexpected(plan.error());
+  FARFIELD_TRY_LET(auto plan, runtime_->plan_frame());
   runtime_->prefetch();
 
   const TraceScene scene{scene_.get(), runtime_.get(), &lights};
-  const auto traced = path_trace(scene, camera, options.trace, film, done, options.cancel);
-  if (!traced) return tl::unexpected(traced.error());
+  FARFIELD_TRY_LET(const auto traced, path_trace(scene, camera, options.trace, film, job));
 
   const Stats after = runtime_->stats();
   FrameReport report;
@@ -70,10 +66,10 @@ Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& li
   report.rss_bytes = resident_set_bytes();
   report.levels_loaded = after.levels_loaded - before.levels_loaded;
   report.fallbacks = after.fallbacks - before.fallbacks;
-  report.rays = traced->rays;
-  report.invalid_samples = traced->invalid_samples;
-  report.bias = plan->bias;
-  report.finest_level = std::move(plan->finest_level);
+  report.rays = traced.rays;
+  report.invalid_samples = traced.invalid_samples;
+  report.bias = plan.bias;
+  report.finest_level = std::move(plan.finest_level);
   return report;
 }
 

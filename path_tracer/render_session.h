@@ -24,10 +24,10 @@ class RenderSession {
                                                      std::span<const std::filesystem::path> folders,
                                                      std::span<const GltfInstance> instances);
 
-  /// Plans for the camera, loads, and renders into the film. `done` as in path_trace. The report's frame number is not
+  /// Plans for the camera, loads, and renders into the film. The report's frame number is not
   /// set. Errors: those of plan_frame and path_trace.
   Result<FrameReport> render(const Camera& camera, const Lights& lights, const RenderOptions& options, Film& film,
-                             const std::function<void(double done)>& done);
+                             const Job& job);
 
   Stats stats() const { return runtime_->stats(); }
 

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "base/result.h"
+
 namespace farfield {
 
 namespace {
@@ -59,9 +61,8 @@ Result<Lights> make_lights(const GltfScene& scene, const RenderOptions& options,
   }
 
   if (!options.environment.empty()) {
-    auto environment = Environment::from_exr(options.environment);
-    if (!environment) return tl::unexpected(environment.error());
-    lights.environment = *environment;
+    FARFIELD_TRY_LET(auto environment, Environment::from_exr(options.environment));
+    lights.environment = environment;
     if (sun) warnings.push_back("the environment image replaces the scene's directional lights");
     return lights;
   }

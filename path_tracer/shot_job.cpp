@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "base/file_io.h"
+#include "base/result.h"
 #include "path_tracer/frame_renderer.h"
 #include "path_tracer/image.h"
 #include "path_tracer/shot_record.h"
@@ -105,9 +106,8 @@ Result<RenderReport> render_shot(const RenderOptions& options, const FrameRange&
   std::error_code error;
   fs::create_directories(out, error);
   if (error) return make_error(ErrorCode::Io, fmt::format("cannot create {}: {}", out.string(), error.message()));
-  const auto renderer = FrameRenderer::prepare(options);
-  if (!renderer) return tl::unexpected(renderer.error());
-  const std::string& fingerprint = (*renderer)->fingerprint();
+  FARFIELD_TRY_LET(const auto renderer, FrameRenderer::prepare(options));
+  const std::string& fingerprint = renderer->fingerprint();
 
   // The sheet and the frames of an earlier run are read before memory is measured.
   ContactSheet sheet = make_sheet(frames, options.width, options.height);
@@ -120,18 +120,17 @@ Result<RenderReport> render_shot(const RenderOptions& options, const FrameRange&
     options.message(fmt::format("{} of {} frames are finished already", finished_count, frames.count()));
 
   RenderReport report = earlier;
-  const auto take_frame = [&](const Image& image, const Metadata& metadata, const RenderReport& so_far) {
+  const auto take_frame = [&](const Image& image, const Metadata& metadata,
+                              const RenderReport& so_far) -> Result<void> {
     const int frame = so_far.frames.back().frame;
-    if (auto written = write_frame(frame_path(out, frame), image, metadata, options.exposure_stops); !written)
-      return written;
+    FARFIELD_TRY(write_frame(frame_path(out, frame), image, metadata, options.exposure_stops));
     sheet.set(sheet_cell(frames, frame), image);
     report = join_reports(earlier, so_far);
     return write_record(out / "shot.json", {fingerprint, report});
   };
   if (!missing.empty()) {
-    const auto rendered = (*renderer)->render(missing, take_frame);
-    if (!rendered) return tl::unexpected(rendered.error());
-    report = join_reports(earlier, *rendered);
+    FARFIELD_TRY_LET(const auto rendered, renderer->render(missing, take_frame));
+    report = join_reports(earlier, rendered);
     // Writing the last frame may have been the peak.
     if (auto written = write_record(out / "shot.json", {fingerprint, report}); !written)
       return tl::unexpected(written.error());

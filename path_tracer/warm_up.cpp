@@ -6,10 +6,11 @@
 
 #include <filesystem>
 
+#include "base/result.h"
+#include "base/temporary_file.h"
 #include "cache/level_file.h"
 #include "cache/manifest.h"
 #include "path_tracer/integrator.h"
-#include "path_tracer/temporary_file.h"
 
 namespace farfield {
 
@@ -81,16 +82,14 @@ Result<LevelEntry> write_warm_up_level(const fs::path& folder, uint32_t number) 
   entry.resolution = static_cast<double>(resolution);
   entry.grid = static_cast<uint32_t>(std::lround(kSize / resolution));
   entry.file = fmt::format("level_{:02}.bin", number);
-  const auto bytes = write_level(folder / entry.file, level);
-  if (!bytes) return tl::unexpected(bytes.error());
-  const auto hash = hash_level_file(folder / entry.file);
-  if (!hash) return tl::unexpected(hash.error());
-  entry.file_bytes = *bytes;
-  entry.file_hash = *hash;
+  FARFIELD_TRY_LET(const auto bytes, write_level(folder / entry.file, level));
+  FARFIELD_TRY_LET(const auto hash, hash_level_file(folder / entry.file));
+  entry.file_bytes = bytes;
+  entry.file_hash = hash;
   entry.triangles = face_count(level);
   entry.voxels = voxel_count(level);
   entry.bricks = level.bricks.size();
-  entry.resident_bytes = 4 * *bytes;  // far below kBudget, and no less than it takes
+  entry.resident_bytes = 4 * bytes;  // far below kBudget, and no less than it takes
   return entry;
 }
 
@@ -103,9 +102,8 @@ Result<void> write_warm_up_asset(const fs::path& folder) {
   for (int corner = 0; corner < 8; ++corner)
     manifest.hull.push_back(kSize * vec3(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1));
   for (uint32_t number = 0; number < 2; ++number) {
-    auto entry = write_warm_up_level(folder, number);
-    if (!entry) return tl::unexpected(entry.error());
-    manifest.levels.push_back(*entry);
+    FARFIELD_TRY_LET(auto entry, write_warm_up_level(folder, number));
+    manifest.levels.push_back(entry);
   }
   return write_manifest(folder, manifest);
 }
@@ -114,13 +112,10 @@ Result<void> write_warm_up_asset(const fs::path& folder) {
 Result<void> trace_warm_up_asset(const DeviceHandle& device, const fs::path& folder) {
   RuntimeOptions options;
   options.budget_bytes = kBudget;
-  auto runtime = Runtime::create(device.get(), options);
-  if (!runtime) return tl::unexpected(runtime.error());
-  const auto asset = (*runtime)->open_asset(folder.string());
-  if (!asset) return tl::unexpected(asset.error());
-  if (auto added = (*runtime)->add_instance(*asset, mat4x3(1.0f)); !added) return tl::unexpected(added.error());
-  const auto scene = make_scene(device, **runtime);
-  if (!scene) return tl::unexpected(scene.error());
+  FARFIELD_TRY_LET(auto runtime, Runtime::create(device.get(), options));
+  FARFIELD_TRY_LET(const auto asset, runtime->open_asset(folder.string()));
+  FARFIELD_TRY(runtime->add_instance(asset, mat4x3(1.0f)));
+  FARFIELD_TRY_LET(const auto scene, make_scene(device, *runtime));
 
   Lights lights;
   lights.environment = Environment::sun_sky({});
@@ -131,31 +126,30 @@ Result<void> trace_warm_up_asset(const DeviceHandle& device, const fs::path& fol
     const vec3 forward = glm::normalize(vec3(-1.0f));
     const Camera camera = Camera::perspective(vec3(0.5f * kSize) - kSize * distance * forward, forward,
                                               vec3(0.0f, 1.0f, 0.0f), 1.0f / distance, film.width(), film.height());
-    (*runtime)->set_cameras({camera.tessellation()});
-    if (auto plan = (*runtime)->plan_frame(); !plan) return tl::unexpected(plan.error());
-    (*runtime)->prefetch();
-    const TraceScene traced{scene->get(), runtime->get(), &lights};
+    runtime->set_cameras({camera.tessellation()});
+    FARFIELD_TRY(runtime->plan_frame());
+    runtime->prefetch();
+    const TraceScene traced{scene.get(), runtime.get(), &lights};
     if (auto result = path_trace(traced, camera, trace, film); !result) return tl::unexpected(result.error());
   }
   return {};
 }
 
 Result<void> write_images(const fs::path& folder, const Image& frame) {
-  if (auto written = write_exr(folder / "frame.exr", frame); !written) return written;
+  FARFIELD_TRY(write_exr(folder / "frame.exr", frame));
   return write_png(folder / "frame.png", frame);
 }
 
 }  // namespace
 
 Result<void> warm_up(const DeviceHandle& device, const Image& frame) {
-  auto folder = TemporaryFolder::create();
-  if (!folder) return tl::unexpected(folder.error());
-  if (auto written = write_warm_up_asset(folder->path()); !written) return written;
-  if (auto traced = trace_warm_up_asset(device, folder->path()); !traced) return traced;
-  if (auto written = write_images(folder->path(), frame); !written) return written;
+  FARFIELD_TRY_LET(auto folder, TemporaryFolder::create());
+  FARFIELD_TRY(write_warm_up_asset(folder.path()));
+  FARFIELD_TRY(trace_warm_up_asset(device, folder.path()));
+  FARFIELD_TRY(write_images(folder.path(), frame));
   // Once more after the trim: what the writers need stays with the process, as it does between frames.
   malloc_trim(0);
-  return write_images(folder->path(), frame);
+  return write_images(folder.path(), frame);
 }
 
 }  // namespace farfield

@@ -11,6 +11,7 @@
 
 #include "base/hash.h"
 #include "base/parallel.h"
+#include "base/result.h"
 #include "prefilter/alpha_cut.h"
 #include "prefilter/triangulate.h"
 #include "prefilter/weld.h"
@@ -349,11 +350,10 @@ std::vector<std::string> limit(std::vector<std::string> warnings) {
 
 Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name) {
   drop_faces_that_are_not_finite(mesh);
-  const auto origin = choose_origin(mesh, name);
-  if (!origin) return tl::unexpected(origin.error());
+  FARFIELD_TRY_LET(const auto origin, choose_origin(mesh, name));
   std::vector<vec3> positions;
   positions.reserve(mesh.positions.size());
-  for (const dvec3& p : mesh.positions) positions.emplace_back(p - *origin);
+  for (const dvec3& p : mesh.positions) positions.emplace_back(p - origin);
   mesh.positions = {};
   WeldResult welded = weld(positions, mesh.face_begin, mesh.corner_position);
   positions = {};
@@ -364,7 +364,7 @@ Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name) {
 
   ImportedAsset asset;
   asset.surface = SurfaceBuilder(mesh, std::move(welded.positions)).build(triangles);
-  asset.surface.origin = *origin;
+  asset.surface.origin = origin;
   if (asset.surface.triangles.empty()) {
     return make_error(ErrorCode::BadFile, fmt::format("{}: no face has any area", name));
   }
@@ -374,9 +374,8 @@ Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name) {
 }
 
 Result<ImportedAsset> import_asset(const fs::path& path, const ImportOptions& options) {
-  auto mesh = read_source(path, options);
-  if (!mesh) return tl::unexpected(mesh.error());
-  return condition(std::move(*mesh), path.string());
+  FARFIELD_TRY_LET(auto mesh, read_source(path, options));
+  return condition(std::move(mesh), path.string());
 }
 
 }  // namespace farfield

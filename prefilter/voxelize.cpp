@@ -14,6 +14,7 @@
 
 #include "base/hash.h"
 #include "base/parallel.h"
+#include "base/result.h"
 #include "prefilter/density.h"
 #include "prefilter/ray_scene.h"
 #include "prefilter/self_shadowing.h"
@@ -224,10 +225,6 @@ std::vector<Voxel> measure_brick(const Measurement& m, const ivec3& brick, Voxel
   return voxels;
 }
 
-bool is_cancelled(const VoxelizeOptions& options) {
-  return options.cancel && options.cancel->load(std::memory_order_relaxed);  // relaxed: only a flag, it guards no data
-}
-
 Result<void> check_arguments(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options) {
   if (!(lattice.voxel_size > 0) || options.rays_per_voxel == 0) {
     return make_error(ErrorCode::InvalidArgument,
@@ -272,33 +269,30 @@ Result<std::vector<std::vector<Voxel>>> measure_bricks(const Surface& geometry, 
   std::atomic<size_t> done{0};  // relaxed: only for the progress
   const std::thread::id caller = std::this_thread::get_id();
   parallel_for(count, 4, [&](size_t begin, size_t end) {
-    if (is_cancelled(options)) return;
+    if (options.job.is_cancelled()) return;
     for (size_t i = begin * stride; i < end * stride && i < voxels.size(); i += stride) {
       voxels[i] = measure_brick(measurement, candidates.coordinates[i], candidates.masks[i]);
     }
     const size_t bricks_done = done.fetch_add(end - begin, std::memory_order_relaxed) + end - begin;
-    if (options.progress && std::this_thread::get_id() == caller) {
-      options.progress(static_cast<double>(bricks_done) / static_cast<double>(count));
+    if (std::this_thread::get_id() == caller) {
+      options.job.report(static_cast<double>(bricks_done) / static_cast<double>(count), "voxelise");
     }
   });
-  if (is_cancelled(options)) return make_error(ErrorCode::Cancelled, "voxelize: cancelled");
-  if (options.progress) options.progress(1);
+  if (options.job.is_cancelled()) return make_error(ErrorCode::Cancelled, "voxelize: cancelled");
+  options.job.report(1, "voxelise");
   return voxels;
 }
 
 }  // namespace
 
 Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options) {
-  if (auto checked = check_arguments(geometry, lattice, options); !checked) {
-    return tl::unexpected<Error>(checked.error());
-  }
+  FARFIELD_TRY(check_arguments(geometry, lattice, options));
   SparseVolume volume;
   volume.lattice = lattice;
   VoxelSet candidates = find_candidates(geometry, lattice);
-  auto voxels = measure_bricks(geometry, lattice, candidates, 1, options);
-  if (!voxels) return tl::unexpected<Error>(voxels.error());
-  for (size_t i = 0; i < voxels->size(); ++i) {
-    std::vector<Voxel>& of_brick = (*voxels)[i];
+  FARFIELD_TRY_LET(auto voxels, measure_bricks(geometry, lattice, candidates, 1, options));
+  for (size_t i = 0; i < voxels.size(); ++i) {
+    std::vector<Voxel>& of_brick = voxels[i];
     if (of_brick.empty()) continue;
     volume.bricks.push_back({candidates.coordinates[i], candidates.masks[i], volume.voxels.size()});
     volume.voxels.insert(volume.voxels.end(), of_brick.begin(), of_brick.end());
@@ -310,17 +304,14 @@ Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& latti
 Result<VolumeSize> estimate_volume(const Surface& geometry, const VoxelLattice& lattice,
                                    const VoxelizeOptions& options) {
   constexpr size_t kStride = 32, kEnoughBricks = 64;
-  if (auto checked = check_arguments(geometry, lattice, options); !checked) {
-    return tl::unexpected<Error>(checked.error());
-  }
+  FARFIELD_TRY(check_arguments(geometry, lattice, options));
   VolumeSize size;
   VoxelSet candidates = find_candidates(geometry, lattice);
   if (candidates.coordinates.size() < kStride * kEnoughBricks) return size;
   VoxelizeOptions quietly = options;
-  quietly.progress = nullptr;
-  const auto voxels = measure_bricks(geometry, lattice, candidates, kStride, quietly);
-  if (!voxels) return tl::unexpected<Error>(voxels.error());
-  for (const std::vector<Voxel>& of_brick : *voxels) {
+  quietly.job = options.job.quiet();
+  FARFIELD_TRY_LET(const auto voxels, measure_bricks(geometry, lattice, candidates, kStride, quietly));
+  for (const std::vector<Voxel>& of_brick : voxels) {
     size.voxels += kStride * of_brick.size();
     size.bricks += of_brick.empty() ? 0 : kStride;
   }

@@ -3,11 +3,10 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
-#include <functional>
 #include <vector>
 
+#include "base/job.h"
 #include "base/result.h"
 #include "base/vec.h"
 #include "prefilter/surface.h"
@@ -42,10 +41,9 @@ struct SparseVolume {
 };
 
 struct VoxelizeOptions {
-  uint32_t rays_per_voxel = 200;                ///< > 0; see voxelize()
-  uint64_t seed = 0;                            ///< with the voxel's coordinate it fixes the voxel's rays
-  const std::atomic<bool>* cancel = nullptr;    ///< polled for every few bricks
-  std::function<void(double done)> progress{};  ///< done in [0, 1]; called from the calling thread
+  uint32_t rays_per_voxel = 200;  ///< > 0; see voxelize()
+  uint64_t seed = 0;              ///< with the voxel's coordinate it fixes the voxel's rays
+  Job job{};                      ///< reports from the calling thread alone; polled for every few bricks
 };
 
 /// Mean optical depth over a voxel's side below which voxels are thinned out.

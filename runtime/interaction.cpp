@@ -100,8 +100,6 @@ float ray_offset(const InstanceRecord& instance, const vec3& origin, const vec3&
   return kOffsetRoundings * (largest(origin) + largest(position) + glm::length(position - origin) + asset_size);
 }
 
-ScatterSample to_host(const ScatterResult& result) { return {result.wi, result.weight, result.pdf}; }
-
 }  // namespace
 
 const InteractionModel& InteractionModel::of(const Interaction& interaction) {
@@ -110,6 +108,10 @@ const InteractionModel& InteractionModel::of(const Interaction& interaction) {
 
 void InteractionModel::put(Interaction& interaction, const InteractionModel& model) {
   new (interaction.model_) InteractionModel(model);
+}
+
+bool is_hit_of(const TracedLevel& level, const HitRecord& hit) {
+  return hit.is_volume ? hit.element < level.voxel_count : hit.element / 2 < level.view.quad_first_face.size();
 }
 
 Interaction make_interaction(const TracedLevel& level, const InstanceRecord& instance, const RTCRayHit& ray_hit,
@@ -148,22 +150,25 @@ Interaction make_interaction(const TracedLevel& level, const InstanceRecord& ins
 }
 
 vec3 Interaction::ray_origin(const vec3& wi) const {
-  if (kind == Kind::Volume) return position;
+  if (kind != Kind::Surface) return position;
   const float side = glm::dot(wi, geometric_normal) < 0.0f ? -1.0f : 1.0f;
   return position + side * InteractionModel::of(*this).offset * geometric_normal;
 }
 
 ScatterSample Interaction::sample(Rng& rng) const {
+  if (kind == Kind::None) return {};
   const InteractionModel& model = InteractionModel::of(*this);
-  return to_host(kind == Kind::Surface ? model.surface.sample(rng) : model.flakes.sample(rng));
+  return kind == Kind::Surface ? model.surface.sample(rng) : model.flakes.sample(rng);
 }
 
 glm::vec3 Interaction::eval(const glm::vec3& wi, Rng& rng) const {
+  if (kind == Kind::None) return vec3(0.0f);
   const InteractionModel& model = InteractionModel::of(*this);
   return kind == Kind::Surface ? model.surface.eval(wi, rng) : model.flakes.eval(wi, rng);
 }
 
 float Interaction::pdf(const glm::vec3& wi) const {
+  if (kind == Kind::None) return 0.0f;
   const InteractionModel& model = InteractionModel::of(*this);
   return kind == Kind::Surface ? model.surface.pdf(wi) : model.flakes.pdf(wi);
 }

@@ -10,7 +10,11 @@
 
 namespace farfield {
 
-/// Rebuilds the interaction of a hit on `level` of `instance`. ray_hit: as rtcIntersect1 left it. Pure.
+/// Whether the level has what the record says was hit.
+bool is_hit_of(const TracedLevel& level, const HitRecord& hit);
+
+/// Rebuilds the interaction of a hit on `level` of `instance`; is_hit_of(level, hit). ray_hit: as rtcIntersect1 left
+/// it. Pure.
 Interaction make_interaction(const TracedLevel& level, const InstanceRecord& instance, const RTCRayHit& ray_hit,
                              const HitRecord& hit);
 

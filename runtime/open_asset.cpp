@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "base/hash.h"
+#include "base/result.h"
 #include "cache/level_file.h"
 #include "cache/manifest.h"
 
@@ -69,19 +70,17 @@ Result<void> check_header(const LevelHeader& header, const OpenAsset& asset, uin
 Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::filesystem::path& path,
                               BvhDevice& device) {
   auto loaded = std::make_unique<LoadedLevel>();
-  auto file = LevelFile::open(path, LevelCheck::Full);
-  if (!file) return tl::unexpected(file.error());
-  loaded->file = std::move(*file);
+  FARFIELD_TRY_LET(auto file, LevelFile::open(path, LevelCheck::Full));
+  loaded->file = std::move(file);
   if (hash_bytes(loaded->file->bytes()) != asset.file_hashes[slot]) {
     return make_error(ErrorCode::BadFile, fmt::format("{} is not the file that its manifest meant when the asset was "
                                                       "opened; open it again, or bake it again",
                                                       path.string()));
   }
   const LevelView& view = loaded->file->view();
-  if (auto fits = check_header(view.header, asset, slot, path); !fits) return tl::unexpected(fits.error());
-  auto traced = TracedLevel::build(device, view, slot);
-  if (!traced) return tl::unexpected(traced.error());
-  loaded->traced = std::move(*traced);
+  FARFIELD_TRY(check_header(view.header, asset, slot, path));
+  FARFIELD_TRY_LET(auto traced, TracedLevel::build(device, view, slot));
+  loaded->traced = std::move(traced);
   loaded->file->release_build_pages();
   const LevelCost cost = level_cost(view, loaded->traced->scene);
   return LoadedItem{std::move(loaded), cost.resident_bytes, cost.build_peak_bytes};
@@ -96,29 +95,25 @@ uint64_t OpenAsset::table_bytes() const {
 }
 
 Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folder) {
-  const Result<Manifest> manifest = read_manifest(folder);
-  if (!manifest) return tl::unexpected(manifest.error());
-  if (manifest->levels.empty() || manifest->levels.size() > kLargestLevelCount) {
-    return make_error(ErrorCode::Unsupported,
-                      fmt::format("{} has {} levels; from 1 to {} are possible", folder.string(),
-                                  manifest->levels.size(), kLargestLevelCount));
+  FARFIELD_TRY_LET(const auto manifest, read_manifest(folder));
+  if (manifest.levels.empty() || manifest.levels.size() > kLargestLevelCount) {
+    return make_error(ErrorCode::Unsupported, fmt::format("{} has {} levels; from 1 to {} are possible",
+                                                          folder.string(), manifest.levels.size(), kLargestLevelCount));
   }
   auto asset = std::make_unique<OpenAsset>();
   asset->name = folder.filename().string();
   asset->folder = folder;
-  asset->origin = manifest->origin;
-  asset->bounds_source = {vec3(manifest->origin + dvec3(manifest->bounds.lower)),
-                          vec3(manifest->origin + dvec3(manifest->bounds.upper))};
+  asset->origin = manifest.origin;
+  asset->bounds_source = {vec3(manifest.origin + dvec3(manifest.bounds.lower)),
+                          vec3(manifest.origin + dvec3(manifest.bounds.upper))};
   TracedAsset& traced = asset->traced;
-  traced.bounds = padded_bounds(manifest->bounds);
-  traced.hull.assign(manifest->hull.begin(), manifest->hull.end());
-  traced.base_resolution = static_cast<float>(manifest->base_resolution);
-  traced.loaded = std::make_unique<std::atomic<const TracedLevel*>[]>(manifest->levels.size());
-  for (const LevelEntry& entry : manifest->levels) {
-    if (auto there = check_level_file(folder / entry.file, entry.file_bytes); !there) {
-      return tl::unexpected(there.error());
-    }
-    if (auto possible = check_planned_bytes(entry, folder); !possible) return tl::unexpected(possible.error());
+  traced.bounds = padded_bounds(manifest.bounds);
+  traced.hull.assign(manifest.hull.begin(), manifest.hull.end());
+  traced.base_resolution = static_cast<float>(manifest.base_resolution);
+  traced.loaded = std::make_unique<std::atomic<const TracedLevel*>[]>(manifest.levels.size());
+  for (const LevelEntry& entry : manifest.levels) {
+    FARFIELD_TRY(check_level_file(folder / entry.file, entry.file_bytes));
+    FARFIELD_TRY(check_planned_bytes(entry, folder));
     traced.level_numbers.push_back(static_cast<float>(entry.level));
     asset->levels.push_back({entry.level, static_cast<float>(entry.resolution), entry.triangles, entry.voxels,
                              entry.file_bytes, entry.resident_bytes});

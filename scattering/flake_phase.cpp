@@ -144,8 +144,8 @@ float FlakeModel<kChannels>::pdf(const vec3& wi) const {
 }
 
 template <unsigned kChannels>
-ScatterResult FlakeModel<kChannels>::sample(Rng& rng) const {
-  ScatterResult result;
+ScatterSample FlakeModel<kChannels>::sample(Rng& rng) const {
+  ScatterSample result;
   if constexpr (kHasMultiple) {
     if (chances_.multiple > 0 && rng.next() < chances_.multiple) {
       result.wi = Sggx(flakes_).sample_sigma(rng);

@@ -18,8 +18,8 @@
 
 #include "base/random.h"
 #include "base/vec.h"
+#include "farfield/scatter_sample.h"
 #include "scattering/channels.h"
-#include "scattering/scatter_sample.h"
 #include "scattering/sggx.h"
 #include "scattering/surface_bsdf.h"
 #include "scattering/sym_mat3.h"
@@ -52,7 +52,7 @@ class FlakeModel {
   /// `weight` below is used.
   float pdf(const vec3& wi) const;
   /// weight = albedo * phase / true density of the sample (albedo itself for white diffuse flakes); `pdf` = pdf(wi).
-  ScatterResult sample(Rng& rng) const;
+  ScatterSample sample(Rng& rng) const;
 
  private:
   static constexpr bool kHasDiffuse = (kChannels & kDiffuse) != 0;

@@ -20,7 +20,7 @@
 // multiple scattering, and no branch per call decides so.
 #pragma once
 
-#include "scattering/scatter_sample.h"
+#include "farfield/scatter_sample.h"
 #include "scattering/sggx.h"
 #include "scattering/trig_lobe.h"
 
@@ -40,7 +40,7 @@ struct MediumAlbedos {
 };
 
 /// One scattering event. weight is an albedo; 0 if there was none.
-struct MediumEvent : ScatterResult {
+struct MediumEvent : ScatterSample {
   bool is_multiple = false;
 };
 

@@ -147,10 +147,10 @@ float SurfaceModel<kChannels>::pdf(const vec3& wi) const {
 }
 
 template <unsigned kChannels>
-ScatterResult SurfaceModel<kChannels>::sample(Rng& rng) const {
+ScatterSample SurfaceModel<kChannels>::sample(Rng& rng) const {
   if (!(specular_chance_ + diffuse_chance_ + transmission_chance_ > 0)) return {};
   const float lobe = rng.next(), u1 = rng.next(), u2 = rng.next();
-  ScatterResult result;
+  ScatterSample result;
   const bool is_specular = kHasSpecular && lobe < specular_chance_;
   if (is_specular) {
     if constexpr (kHasSpecular) result.wi = reflect_about(wo_, specular_.facets.sample_visible(wo_, u1, u2));

@@ -14,9 +14,9 @@
 
 #include "base/random.h"
 #include "base/vec.h"
+#include "farfield/scatter_sample.h"
 #include "scattering/channels.h"
 #include "scattering/microfacet.h"
-#include "scattering/scatter_sample.h"
 #include "scattering/sym_mat3.h"
 
 namespace farfield {
@@ -42,7 +42,7 @@ class SurfaceModel {
   vec3 eval(const vec3& wi, Rng& rng) const;
   /// Exact density of sample(), per steradian.
   float pdf(const vec3& wi) const;
-  ScatterResult sample(Rng& rng) const;
+  ScatterSample sample(Rng& rng) const;
 
  private:
   static constexpr bool kHasDiffuse = (kChannels & kDiffuse) != 0;

@@ -33,8 +33,8 @@ Result<void> run_bake(BakeArguments& arguments) {
     return writable;
   const ThreadLimit limit(arguments.threads);
   ProgressLine progress;
-  arguments.options.progress = [&](const std::string& stage, double done) { progress.update(done, stage); };
-  arguments.options.cancel = &catch_interrupts();
+  arguments.options.job = {[&](double done, const std::string& stage) { progress.update(done, stage); },
+                           &catch_interrupts()};
 
   const auto report = bake(arguments.source, arguments.output, arguments.options);
   progress.clear();

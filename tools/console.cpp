@@ -11,6 +11,7 @@
 #include <span>
 
 #include "base/file_io.h"
+#include "base/result.h"
 
 namespace farfield::tool {
 namespace fs = std::filesystem;
@@ -101,8 +102,8 @@ Result<void> check_keeps(const fs::path& path, const std::vector<fs::path>& inpu
 
 Result<void> check_can_write(const fs::path& path, Output output, const std::vector<fs::path>& inputs) {
   if (path.empty() || (output == Output::Text && is_stream(path))) return {};
-  if (auto named = check_extension(path, output); !named) return named;
-  if (auto kept = check_keeps(path, inputs); !kept) return kept;
+  FARFIELD_TRY(check_extension(path, output));
+  FARFIELD_TRY(check_keeps(path, inputs));
   const auto refuse = [&](std::string_view reason) {
     return make_error(ErrorCode::Io, fmt::format("{}: cannot write: {}", path.string(), reason));
   };

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "base/parallel.h"
+#include "base/result.h"
 #include "evaluate/evaluate.h"
 #include "tools/args.h"
 #include "tools/commands.h"
@@ -44,8 +45,8 @@ std::string evaluation_table(const Evaluation& evaluation) {
 
 Result<void> run_evaluate(EvaluateArguments& arguments) {
   const std::vector<std::filesystem::path> inputs = {arguments.source, arguments.asset};
-  if (auto writable = check_can_write(arguments.json, Output::Text, inputs); !writable) return writable;
-  if (auto writable = check_can_write(arguments.sheet, Output::Png, inputs); !writable) return writable;
+  FARFIELD_TRY(check_can_write(arguments.json, Output::Text, inputs));
+  FARFIELD_TRY(check_can_write(arguments.sheet, Output::Png, inputs));
   const ThreadLimit limit(arguments.threads);
   ProgressLine progress;
   EvaluateOptions& options = arguments.options;
@@ -55,8 +56,7 @@ Result<void> run_evaluate(EvaluateArguments& arguments) {
   options.images = arguments.images;
   options.first_level = arguments.levels.first;
   options.last_level = arguments.levels.last;
-  options.progress = [&](const std::string& stage, double done) { progress.update(done, stage); };
-  options.cancel = &catch_interrupts();
+  options.job = {[&](double done, const std::string& stage) { progress.update(done, stage); }, &catch_interrupts()};
 
   const auto evaluation = evaluate(options);
   progress.clear();

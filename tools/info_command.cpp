@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include "base/result.h"
 #include "cache/manifest.h"
 #include "tools/commands.h"
 #include "tools/flags.h"
@@ -10,9 +11,8 @@ namespace farfield::tool {
 namespace {
 
 Result<void> run_info(const std::string& asset, bool as_json) {
-  const auto manifest = read_manifest(asset);
-  if (!manifest) return tl::unexpected(manifest.error());
-  fmt::print("{}", as_json ? info_json(asset, *manifest) : info_table(asset, *manifest));
+  FARFIELD_TRY_LET(const auto manifest, read_manifest(asset));
+  fmt::print("{}", as_json ? info_json(asset, manifest) : info_table(asset, manifest));
   return {};
 }
 

@@ -81,13 +81,12 @@ Result<RenderReport> run_with_progress(RenderArguments& arguments,
   options.scene = arguments.scene;
   options.assets = arguments.assets;
   options.environment = arguments.environment;
-  options.progress = [&](double done, const std::string& what) { progress.update(done, what); };
+  options.job = {[&](double done, const std::string& stage) { progress.update(done, stage); }, &catch_interrupts()};
   options.message = [&](const std::string& line) {
     if (!stdout_is_terminal()) return;
     progress.clear();
     fmt::print("{}\n", one_line(line));
   };
-  options.cancel = &catch_interrupts();
   return job(options);
 }
 

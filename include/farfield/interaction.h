@@ -8,6 +8,7 @@
 #include "farfield/export.h"
 #include "farfield/random.h"
 #include "farfield/ray.h"
+#include "farfield/scatter_sample.h"
 
 namespace farfield {
 
@@ -15,25 +16,22 @@ namespace detail {
 struct InteractionModel;
 }
 
-/// One sampled direction. A zero weight is a failed sample: end the path.
-struct ScatterSample {
-  glm::vec3 wi{0.0f};      ///< unit, away from the point
-  glm::vec3 weight{0.0f};  ///< linear RGB: what to multiply the path's throughput by. Not eval() / pdf in volumes
-  float pdf = 0;           ///< per steradian: pdf(wi), for multiple importance sampling
-};
-
 /// Where a ray met an instance and how light scatters there. A value that refers to the Runtime: use it before the next
 /// plan_frame(). All directions are unit vectors in world space that point away from the point. Safe from any thread.
 class FARFIELD_API Interaction {
  public:
-  enum class Kind : uint8_t { Surface, Volume };
+  enum class Kind : uint8_t {
+    None,  ///< the ray met nothing of ours, or the hit is older than the plan: black, samples have weight 0
+    Surface,
+    Volume,
+  };
 
-  Kind kind = Kind::Surface;
+  Kind kind = Kind::None;
   glm::vec3 position{0.0f};          ///< world
   glm::vec3 wo{0.0f};                ///< where the ray came from
   glm::vec3 geometric_normal{0.0f};  ///< unit, on wo's side; zero in volumes
   float footprint = 0;               ///< world width of what the ray stands for here
-  uint32_t instance = 0;             ///< InstanceId of the hit
+  uint32_t instance = kNoInstance;   ///< InstanceId of the hit
   uint32_t level = 0;                ///< k of the level that was hit
   float lambda = 0;                  ///< continuous level that the ray asked for
   glm::vec3 albedo{0.0f};            ///< diffuse + specular + transmission, for AOVs and denoisers

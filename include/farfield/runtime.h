@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "farfield/camera.h"
 #include "farfield/export.h"
 #include "farfield/interaction.h"
 #include "farfield/ray.h"
@@ -57,15 +58,6 @@ struct AssetId {
 };
 struct InstanceId {
   uint32_t value;
-};
-
-/// A camera that fixes each instance's level: at distance d a pixel is pixel_width + pixel_spread * d world units wide.
-/// Perspective: width 0 and spread 2 tan(fov_y / 2) / image height in pixels. Orthographic: the pixel's width and
-/// spread 0.
-struct TessellationCamera {
-  glm::vec3 position{0.0f};
-  float pixel_width = 0;
-  float pixel_spread = 0;
 };
 
 /// One stored level of an open asset.
@@ -110,9 +102,10 @@ class FARFIELD_API Runtime {
   /// Opens a baked asset: reads its manifest and checks it, loads its root. Opening the same folder again gives the
   /// same id. Errors: NotFound, Io, BadFile, Unsupported, OutOfBudget (the message has the number that would do).
   Result<AssetId> open_asset(const std::string& folder);
-  /// The asset's stored levels, finest first.
+  /// The asset's stored levels, finest first; none for an id that open_asset() did not give.
   const std::vector<LevelInfo>& levels(AssetId asset) const;
-  /// Corners of the box that contains all levels, in the space of the source.
+  /// Corners of the box that contains all levels, in the space of the source. For an id that open_asset() did not give
+  /// the empty box: lower is infinite, upper minus infinite.
   void bounds(AssetId asset, glm::vec3& lower, glm::vec3& upper) const;
 
   /// Adds an instance. local_to_world: affine, invertible, finite. Errors: InvalidArgument.
@@ -138,7 +131,8 @@ class FARFIELD_API Runtime {
   Result<unsigned> attach(RTCScene scene);
   unsigned geometry_id() const;
 
-  /// The interaction of a hit: ray_hit and context as rtcIntersect1 left them, hit.geomID == geometry_id().
+  /// The interaction of a hit: ray_hit and context as rtcIntersect1 left them, hit.geomID == geometry_id(). A hit that
+  /// is not ours, or from before the last plan_frame() and gone since, is an Interaction of Kind::None, said once.
   Interaction interaction(const RTCRayHit& ray_hit, const RayContext& context) const;
 
   Stats stats() const;

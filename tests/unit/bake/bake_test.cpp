@@ -263,8 +263,8 @@ TEST_F(Bake, ResumesAfterCancellingAnywhereToTheSameBytes) {
     int reports = 0;
     double last = 0;
     BakeOptions options = small_options();
-    options.cancel = &cancel;
-    options.progress = [&](const std::string& stage, double done) {
+    options.job.cancel = &cancel;
+    options.job.progress = [&](double done, const std::string& stage) {
       EXPECT_GE(done, last);
       EXPECT_LE(done, 1);
       last = done;
@@ -285,8 +285,8 @@ TEST_F(Bake, ResumesAfterCancellingAnywhereToTheSameBytes) {
 TEST_F(Bake, IgnoresADamagedLeftover) {
   std::atomic<bool> cancel{false};
   BakeOptions options = small_options();
-  options.cancel = &cancel;
-  options.progress = [&](const std::string& stage, double) { cancel = cancel || stage == "level 3: analyse"; };
+  options.job.cancel = &cancel;
+  options.job.progress = [&](double, const std::string& stage) { cancel = cancel || stage == "level 3: analyse"; };
   ASSERT_FALSE(bake(ball_in_leaves(), "thing", out(), options).has_value());
   int damaged = 0;
   for (const auto& entry : fs::directory_iterator(partial())) {
@@ -355,8 +355,8 @@ TEST_F(Bake, LeavesTheOldAssetAloneUntilTheNewOneIsComplete) {
   std::atomic<bool> cancel{false};
   BakeOptions options = small_options();
   options.finest_grid = 16;
-  options.cancel = &cancel;
-  options.progress = [&](const std::string& stage, double) {
+  options.job.cancel = &cancel;
+  options.job.progress = [&](double, const std::string& stage) {
     EXPECT_EQ(files_of(out()), before);
     cancel = cancel || stage == "level 3: write";
   };
@@ -523,7 +523,7 @@ TEST_F(Bake, RefusesWhatIsNoAssetBeforeItReadsTheSource) {
 TEST_F(Bake, KeepsAFileThatWasPutIntoTheOldAssetMeanwhile) {
   ASSERT_TRUE(bake(two_triangles(), "x", out(), small_options()).has_value());
   BakeOptions options = small_options();
-  options.progress = [&](const std::string& stage, double) {
+  options.job.progress = [&](double, const std::string& stage) {
     if (stage == "level 4: write") test::write_text(out() / "notes.txt", "mine");
   };
   const auto report = bake(ball_in_leaves(), "thing", out(), options);
@@ -617,7 +617,7 @@ TEST_F(Bake, WorkspaceHasOneHolderAtATimeWhileOthersComeAndGo) {
 TEST_F(Bake, RefusesASecondBakeOfTheSameAssetAtOnce) {
   BakeOptions options = small_options();
   bool refused = false;
-  options.progress = [&](const std::string& stage, double) {
+  options.job.progress = [&](double, const std::string& stage) {
     if (stage != "level 1: analyse") return;
     const auto second = bake(two_triangles(), "x", out(), small_options());
     refused = !second && second.error().code == ErrorCode::InvalidArgument;

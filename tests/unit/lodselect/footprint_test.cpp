@@ -95,7 +95,7 @@ TEST(SplitLambda, SendsNanAndNegativeValuesToTheFinestLevelAndSurvivesInfinity) 
 TEST(FinestFootprint, IsThatOfTheNearestPointOfTheBox) {
   const Box3 box{vec3(-1.0f), vec3(1.0f)};
   const auto at = [&](vec3 position) {
-    const FootprintCamera camera{position, 0.0f, 0.01f};
+    const TessellationCamera camera{position, 0.0f, 0.01f};
     return finest_footprint(std::span(&camera, 1), box);
   };
   EXPECT_FLOAT_EQ(at({11.0f, 0.5f, 0.5f}), 0.1f);   // a face
@@ -111,11 +111,11 @@ TEST(FinestFootprint, IsNeverAboveTheFootprintOfAnyPointOfTheBox) {
     Box3 box;
     box.extend(point());
     box.extend(point());
-    const std::array cameras = {FootprintCamera{point(), 0.001f, 0.01f}, FootprintCamera{point(), 0.01f, 0.0f}};
+    const std::array cameras = {TessellationCamera{point(), 0.001f, 0.01f}, TessellationCamera{point(), 0.01f, 0.0f}};
     const float finest = finest_footprint(cameras, box);
     for (int j = 0; j < 100; ++j) {
       const vec3 inside = box.lower + box.size() * vec3(rng.next(), rng.next(), rng.next());
-      for (const FootprintCamera& camera : cameras) {
+      for (const TessellationCamera& camera : cameras) {
         const float there = camera.pixel_width + camera.pixel_spread * glm::length(inside - camera.position);
         ASSERT_LE(finest, there * 1.00001f);
       }
@@ -125,7 +125,8 @@ TEST(FinestFootprint, IsNeverAboveTheFootprintOfAnyPointOfTheBox) {
 
 TEST(FinestFootprint, TakesTheFinestOfTheCamerasAndInfinityWithoutAny) {
   const Box3 box{vec3(-1.0f), vec3(1.0f)};
-  const std::array cameras = {FootprintCamera{{101.0f, 0.0f, 0.0f}, 0.0f, 0.01f}, FootprintCamera{{}, 0.5f, 0.0f}};
+  const std::array cameras = {TessellationCamera{{101.0f, 0.0f, 0.0f}, 0.0f, 0.01f},
+                              TessellationCamera{{}, 0.5f, 0.0f}};
   EXPECT_FLOAT_EQ(finest_footprint(cameras, box), 0.5f);
   EXPECT_EQ(finest_footprint({}, box), kInf);
   EXPECT_EQ(finest_footprint(cameras, Box3{}), kInf);
@@ -133,16 +134,16 @@ TEST(FinestFootprint, TakesTheFinestOfTheCamerasAndInfinityWithoutAny) {
 
 TEST(FinestFootprint, AsksForTheFinestLevelWhenSomethingIsNan) {
   const Box3 box{vec3(-1.0f), vec3(1.0f)};
-  const std::array cameras = {FootprintCamera{{kNan, 0.0f, 0.0f}, 0.0f, 0.01f},
-                              FootprintCamera{{5.0f, 0.0f, 0.0f}, 0.0f, 0.01f}};
+  const std::array cameras = {TessellationCamera{{kNan, 0.0f, 0.0f}, 0.0f, 0.01f},
+                              TessellationCamera{{5.0f, 0.0f, 0.0f}, 0.0f, 0.01f}};
   EXPECT_EQ(finest_footprint(cameras, box), 0.0f);
   EXPECT_EQ(finest_footprint(std::span(cameras).last(1), Box3{vec3(kNan), vec3(1.0f)}), 0.0f);
 }
 
 TEST(FinestFootprint, SurvivesHugeDistances) {
-  const FootprintCamera camera{{1e30f, 0.0f, 0.0f}, 0.0f, 0.01f};
+  const TessellationCamera camera{{1e30f, 0.0f, 0.0f}, 0.0f, 0.01f};
   EXPECT_FLOAT_EQ(finest_footprint(std::span(&camera, 1), Box3{vec3(-1.0f), vec3(1.0f)}), 1e28f);
-  const FootprintCamera far{{3e38f, 0.0f, 0.0f}, 0.0f, 1000.0f};
+  const TessellationCamera far{{3e38f, 0.0f, 0.0f}, 0.0f, 1000.0f};
   EXPECT_EQ(finest_footprint(std::span(&far, 1), Box3{vec3(-1.0f), vec3(1.0f)}), kInf);
 }
 

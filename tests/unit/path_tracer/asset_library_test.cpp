@@ -107,7 +107,7 @@ TEST_F(AssetLibrary, UnwritableFolderIsAnError) {
 TEST_F(AssetLibrary, CancelStopsTheChild) {
   set_baker("exec sleep 1000");
   std::atomic<bool> cancel{false};
-  options_.cancel = &cancel;
+  options_.job.cancel = &cancel;
   std::thread interrupt([&] {
     while (calls().empty()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
     cancel = true;

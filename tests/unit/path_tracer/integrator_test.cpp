@@ -220,12 +220,10 @@ class PathTraceScene : public PathTrace {
     ASSERT_TRUE(runtime_->add_instance(asset, mat4x3(1.0f)));
     scene_ = std::move(*make_scene(device_, *runtime_));
   }
-  Result<TraceStats> trace(const Camera& camera, Film& film, const TraceOptions& options,
-                           const std::function<void(double)>& progress = {},
-                           const std::atomic<bool>* cancel = nullptr) {
+  Result<TraceStats> trace(const Camera& camera, Film& film, const TraceOptions& options, const Job& job = {}) {
     runtime_->set_cameras({camera.tessellation()});
     EXPECT_TRUE(runtime_->plan_frame());
-    return path_trace({scene_.get(), runtime_.get(), &lights_}, camera, options, film, progress, cancel);
+    return path_trace({scene_.get(), runtime_.get(), &lights_}, camera, options, film, job);
   }
   static Camera camera_at(float distance, int side) {
     return Camera::perspective({0, 0, distance}, {0, 0, -1}, {0, 1, 0}, 2 * std::atan(1.2f / distance), side, side);
@@ -274,13 +272,11 @@ TEST_F(PathTraceScene, CancelStopsEarly) {
   options.samples_per_pixel = 16;
   std::atomic<bool> cancel{false};
   std::atomic<int> calls{0};
-  const auto traced = trace(
-      camera_at(10, 256), film, options,
-      [&](double done) {
-        EXPECT_GT(done, 0.0);
-        if (++calls == 3) cancel = true;
-      },
-      &cancel);
+  const auto count = [&](double done, const std::string&) {
+    EXPECT_GT(done, 0.0);
+    if (++calls == 3) cancel = true;
+  };
+  const auto traced = trace(camera_at(10, 256), film, options, {count, &cancel});
   ASSERT_FALSE(traced);
   EXPECT_EQ(traced.error().code, ErrorCode::Cancelled);
   EXPECT_LT(calls, 100);  // of 256 tiles
@@ -292,7 +288,7 @@ TEST_F(PathTraceScene, ProgressReachesOneAndRaysAreCounted) {
   options.samples_per_pixel = 2;
   std::atomic<double> last{0};
   const auto traced = trace(Camera::perspective({0, 0, 5}, {0, 0, -1}, {0, 1, 0}, 1, 40, 20), film, options,
-                            [&](double done) { last = std::max(last.load(), done); });
+                            {[&](double done, const std::string&) { last = std::max(last.load(), done); }});
   ASSERT_TRUE(traced);
   EXPECT_EQ(last, 1.0);
   EXPECT_GE(traced->rays, 1600u);

@@ -195,8 +195,8 @@ TEST_F(Shot, FrameDoesNotDependOnTheFramesBefore) {
 
 TEST_F(Shot, CancelKeepsFinishedFramesAndTheRecord) {
   std::atomic<bool> cancel{false};
-  options_.cancel = &cancel;
-  options_.progress = [&](double, const std::string& what) { cancel = cancel || what.find("frame 12") == 0; };
+  options_.job.cancel = &cancel;
+  options_.job.progress = [&](double, const std::string& what) { cancel = cancel || what.find("frame 12") == 0; };
   const auto report = shoot({0, 24, 12});
   ASSERT_FALSE(report);
   EXPECT_EQ(report.error().code, ErrorCode::Cancelled);

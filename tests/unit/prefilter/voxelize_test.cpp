@@ -256,9 +256,9 @@ TEST(Voxelize, GivesANearlyOpaqueVoxelAFiniteDensity) {
 TEST(Voxelize, StopsWhenCancelled) {
   std::atomic<bool> cancel{false};
   VoxelizeOptions options;
-  options.cancel = &cancel;
+  options.job.cancel = &cancel;
   int calls = 0;
-  options.progress = [&](double done) {
+  options.job.progress = [&](double done, const std::string&) {
     EXPECT_GT(done, 0);
     EXPECT_LT(done, 1);
     ++calls;
@@ -273,7 +273,7 @@ TEST(Voxelize, StopsWhenCancelled) {
 TEST(Voxelize, ReportsProgressUpToTheEnd) {
   VoxelizeOptions options;
   double last = 0;
-  options.progress = [&](double done) {
+  options.job.progress = [&](double done, const std::string&) {
     EXPECT_GE(done, last);
     last = done;
   };

@@ -595,6 +595,56 @@ TEST_F(RuntimeTest, InteractionsSayWhereAndHow) {
   EXPECT_NEAR(host.interaction(hit, context).geometric_normal.z, 1.0f, 0.01f);
 }
 
+TEST_F(RuntimeTest, HitsThatAreNotOursOrHaveGoneAreBlackAndSaidOnce) {
+  Host host;
+  host.add(sphere());
+  host.plan();
+  RayContext context;
+  RTCRayHit hit;
+  ASSERT_TRUE(host.trace({0, 0, 10}, {0, 0.01f, -1}, context, hit));
+  ASSERT_EQ(host.interaction(hit, context).kind, Interaction::Kind::Surface);
+
+  const auto expect_none = [&](const HitRecord& record, const char* what) {
+    RayContext other = context;
+    other.hit = record;
+    const Interaction interaction = host.interaction(hit, other);
+    EXPECT_EQ(interaction.kind, Interaction::Kind::None) << what;
+    Rng rng(1);
+    EXPECT_EQ(interaction.sample(rng).weight, vec3(0.0f)) << what;
+    EXPECT_EQ(interaction.eval({0, 0, 1}, rng), vec3(0.0f)) << what;
+    EXPECT_EQ(interaction.pdf({0, 0, 1}), 0.0f) << what;
+    EXPECT_EQ(interaction.ray_origin({0, 0, 1}), interaction.position) << what;
+  };
+  expect_none(HitRecord{}, "no hit");
+  HitRecord record = context.hit;
+  record.instance = 1;
+  expect_none(record, "instance");
+  record = context.hit;
+  record.level_slot = 255;
+  expect_none(record, "level");
+  record = context.hit;
+  record.element = 0xffffffffu;
+  expect_none(record, "face");
+  record.is_volume = true;
+  expect_none(record, "voxel");
+
+  // A plan from afar drops the level that was hit.
+  host.runtime().set_cameras({{vec3(0, 0, 1e6f), 0.0f, 1e-3f}});
+  ASSERT_TRUE(host.runtime().plan_frame());
+  expect_none(context.hit, "stale");
+  EXPECT_EQ(host.messages.size(), 1u);
+}
+
+TEST_F(RuntimeTest, UnknownAssetsHaveNoLevelsAndNoBounds) {
+  Host host;
+  const AssetId unknown{7};
+  EXPECT_TRUE(host.runtime().levels(unknown).empty());
+  vec3 lower(0.0f), upper(0.0f);
+  host.runtime().bounds(unknown, lower, upper);
+  EXPECT_GT(lower.x, upper.x);
+  EXPECT_EQ(host.runtime().add_instance(unknown, mat4x3(1.0f)).error().code, ErrorCode::InvalidArgument);
+}
+
 TEST_F(RuntimeTest, SurfacesAndBlocksOfAlbedoOneAreWhiteFurnaces) {
   Rng transforms(21);
   for (const float lambda : {0.0f, 1.0f, 1.5f, 2.0f, 3.0f, 5.0f}) {

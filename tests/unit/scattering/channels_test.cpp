@@ -23,7 +23,7 @@ void expect_same(const Full& full, const Trimmed& trimmed, unsigned channels) {
     const vec3 x = full.eval(wi, a), y = trimmed.eval(wi, b);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(x[c], y[c], 1e-5f * (1 + std::abs(x[c]))) << channels;
     EXPECT_NEAR(full.pdf(wi), trimmed.pdf(wi), 1e-5f * (1 + full.pdf(wi))) << channels;
-    const ScatterResult s = full.sample(a), t = trimmed.sample(b);
+    const ScatterSample s = full.sample(a), t = trimmed.sample(b);
     EXPECT_NEAR(s.pdf, t.pdf, 1e-4f * (1 + s.pdf)) << channels;
     EXPECT_NEAR(s.weight.x, t.weight.x, 1e-4f) << channels;
   }

@@ -158,7 +158,7 @@ TEST(FlakePhase, FlakesScatterLikeTheFacesTheyStandFor) {
   for (const float roughness2 : {0.0f, 0.06f, 0.3f, 1.0f}) {
     const FlakeParams p = glossy_leaf(SymMat3::identity(), roughness2, 1.0f);
     const FlakePhase phase(p, wo);
-    const auto by_side = [](const ScatterResult& r) {
+    const auto by_side = [](const ScatterSample& r) {
       return r.weight.y * vec3(1.0f, r.wi.z > 0.5f ? 1.0f : 0.0f, r.wi.z < -0.5f ? 1.0f : 0.0f);
     };
     const Mean flakes = mean_of(200000, 16, [&](Rng& r) { return by_side(phase.sample(r)); });
@@ -225,7 +225,7 @@ TEST(FlakePhase, ExtremesAreFiniteAndNotNegative) {
           p.roughness2 = roughness2, p.self_shadowing = shadowing;
           for (const vec3& wo : directions) {
             const FlakePhase phase(p, wo);
-            const ScatterResult r = phase.sample(rng);
+            const ScatterSample r = phase.sample(rng);
             ASSERT_TRUE(is_finite(r.weight) && min_component(r.weight) >= 0 && std::isfinite(r.pdf));
             for (const vec3& d : directions) {
               for (const vec3& wi : {d, -d, wo, -wo}) {

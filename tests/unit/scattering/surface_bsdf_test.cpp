@@ -41,7 +41,7 @@ TEST(SurfaceBsdf, FlatDiffuseFaceIsExactlyLambertian) {
     p.sggx = SymMat3::outer(n) * 0.37f;
     p.diffuse = vec3(1.0f, 0.5f, 0.0f);
     const SurfaceBsdf bsdf(p, n, direction_over(n, 0.01f + rng.next() * 0.99f, rng.next()));
-    const ScatterResult r = bsdf.sample(rng);
+    const ScatterSample r = bsdf.sample(rng);
     EXPECT_NEAR(r.weight.x, 1, 2e-6);
     EXPECT_NEAR(r.weight.y, 0.5, 1e-6);
     EXPECT_EQ(r.weight.z, 0);
@@ -59,7 +59,7 @@ TEST(SurfaceBsdf, FlatLeafReflectsAndTransmitsAllTheLight) {
   const SurfaceBsdf bsdf(p, n, direction_over(n, 0.3f, 0.1f));
   int through = 0;
   for (int i = 0; i < 20000; ++i) {
-    const ScatterResult r = bsdf.sample(rng);
+    const ScatterSample r = bsdf.sample(rng);
     ASSERT_NEAR(r.weight.x, 1, 2e-5) << "the chances are those of the albedos, so every weight is 1";
     through += glm::dot(r.wi, n) < 0;
   }
@@ -183,7 +183,7 @@ TEST(SurfaceBsdf, ExtremesAreFiniteAndNotNegative) {
         p.roughness2 = roughness2;
         for (const vec3& wo : directions) {
           const SurfaceBsdf bsdf(p, n, wo);
-          const ScatterResult r = bsdf.sample(rng);
+          const ScatterSample r = bsdf.sample(rng);
           ASSERT_TRUE(is_finite(r.weight) && min_component(r.weight) >= 0 && std::isfinite(r.pdf))
               << albedo << roughness2;
           for (const vec3& d : directions) {

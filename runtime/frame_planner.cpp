@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/frame_planner.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "base/parallel.h"
+#include "lodselect/footprint.h"
+
+namespace farfield {
+
+namespace {
+
+// A camera footprint's share of an image: no instance counts for more pixels than a frame has.
+constexpr double kLargestPixelCount = 1e7;
+
+}  // namespace
+
+void FramePlanner::update_footprints(const std::vector<TessellationCamera>& of_cameras) {
+  constexpr size_t kGrain = 1024;
+  parallel_for(geometry_.instances.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      InstanceRecord& instance = geometry_.instances[i];
+      const Box3 bounds = instance_bounds(instance, *geometry_.assets[instance.asset]);
+      instance.footprint.camera_footprint = of_cameras.empty() ? 0.0f : finest_footprint(of_cameras, bounds);
+    }
+  });
+}
+
+/// The lambda that the cameras ask for on an instance, at least 0, not clamped to what there is.
+float FramePlanner::wanted_lambda(const InstanceRecord& instance) const {
+  if (options_.forced_lambda) return std::max(0.0f, *options_.forced_lambda);
+  const InstanceFootprint& footprint = instance.footprint;
+  return lambda_of_footprint(footprint.camera_footprint * footprint.world_to_r0,
+                             geometry_.assets[instance.asset]->base_resolution, std::numeric_limits<int>::max());
+}
+
+std::vector<PlanAsset> FramePlanner::wanted_assets(const LevelStore& levels) const {
+  std::vector<PlanAsset> wanted;
+  for (uint32_t i = 0; i < levels.asset_count(); ++i) wanted.push_back(levels.plan_asset(i));
+  for (const InstanceRecord& instance : geometry_.instances) {
+    PlanAsset& asset = wanted[instance.asset];
+    asset.wanted_lambda = std::min(asset.wanted_lambda, wanted_lambda(instance));
+    // The longest side of the world, in pixels, squared.
+    const double diagonal = glm::length(geometry_.assets[instance.asset]->bounds.size());
+    const double pixel = instance.footprint.camera_footprint * instance.footprint.world_to_r0;
+    const double across = pixel > 0.0 ? options_.lod_scale * diagonal / pixel : kLargestPixelCount;
+    asset.pixels += std::min(across * across, kLargestPixelCount);
+  }
+  return wanted;
+}
+
+Result<PlanSummary> FramePlanner::plan(LevelStore& levels) {
+  if (cameras_.empty() && !options_.forced_lambda) {
+    return make_error(ErrorCode::InvalidArgument, "plan_frame() needs a camera: call set_cameras() before");
+  }
+  levels.stop_loading();
+  update_footprints(cameras_);
+  const auto plan = plan_levels(wanted_assets(levels), options_.budget_bytes, levels.fixed_bytes());
+  if (!plan) {
+    update_footprints(planned_cameras_);  // the former plan stays
+    return tl::unexpected(plan.error());
+  }
+  planned_cameras_ = cameras_;
+  levels.apply(*plan);
+
+  PlanSummary summary;
+  for (uint32_t i = 0; i < levels.asset_count(); ++i) {
+    summary.finest_level.push_back(levels.asset(i).levels[plan->finest[i]].level);
+  }
+  summary.planned_bytes = plan->resident_bytes + plan->build_peak_bytes + levels.fixed_bytes();
+  summary.bias = plan->bias;
+  return summary;
+}
+
+void FramePlanner::prefetch(LevelStore& levels) const {
+  std::vector<std::vector<bool>> is_needed(levels.asset_count());
+  for (uint32_t i = 0; i < levels.asset_count(); ++i) is_needed[i].resize(levels.asset(i).traced.slot_count());
+  for (const InstanceRecord& instance : geometry_.instances) {
+    const SlotBlend slots = split_slots(*geometry_.assets[instance.asset], wanted_lambda(instance));
+    is_needed[instance.asset][slots.slot] = true;
+    if (slots.blend > 0.0f) is_needed[instance.asset][slots.slot + 1] = true;
+  }
+  for (uint32_t i = 0; i < levels.asset_count(); ++i) {
+    for (size_t slot = is_needed[i].size(); slot-- > 0;) {  // coarse ones first: they are what others fall back to
+      if (is_needed[i][slot]) levels.load(i, static_cast<uint32_t>(slot));
+    }
+  }
+}
+
+}  // namespace farfield

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the tessellation cameras ask of each asset, and the plan that fits the budget.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "base/result.h"
+#include "bvh/instance_geometry.h"
+#include "farfield/runtime.h"
+#include "runtime/level_store.h"
+
+namespace farfield {
+
+/// Refers to the instances, whose camera footprints it sets. One thread, between frames.
+class FramePlanner {
+ public:
+  FramePlanner(const RuntimeOptions& options, InstanceGeometry& geometry) : options_(options), geometry_(geometry) {}
+
+  /// Of the coming plan.
+  void set_cameras(std::vector<TessellationCamera> cameras) { cameras_ = std::move(cameras); }
+
+  /// Plans for the cameras and puts the plan in force. After an error the former plan and its footprints stay.
+  /// Errors: OutOfBudget, InvalidArgument (no camera).
+  Result<PlanSummary> plan(LevelStore& levels);
+
+  /// Loads what the cameras will certainly need under the current plan.
+  void prefetch(LevelStore& levels) const;
+
+ private:
+  void update_footprints(const std::vector<TessellationCamera>& of_cameras);
+  float wanted_lambda(const InstanceRecord& instance) const;
+  std::vector<PlanAsset> wanted_assets(const LevelStore& levels) const;
+
+  const RuntimeOptions& options_;
+  InstanceGeometry& geometry_;
+  std::vector<TessellationCamera> cameras_;
+  std::vector<TessellationCamera> planned_cameras_;  ///< those of the plan in force
+};
+
+}  // namespace farfield

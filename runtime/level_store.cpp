@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "runtime/level_store.h"
+
+#include <fmt/format.h>
+#include <malloc.h>
+
+#include <utility>
+
+namespace farfield {
+
+namespace {
+
+// Device, geometry, loader, tables of the runtime itself, and what malloc keeps of small blocks.
+constexpr uint64_t kRuntimeBytes = 256 * 1024;
+// The allocator is asked to give memory back once this share of the budget was freed. Not after every load: in a host
+// with a large heap that costs milliseconds.
+constexpr uint64_t kTrimShare = 64;
+
+}  // namespace
+
+LevelStore::LevelStore(std::unique_ptr<BvhDevice> device, const RuntimeOptions& options, Messages& messages)
+    : budget_bytes_(options.budget_bytes),
+      residency_(options.residency),
+      messages_(messages),
+      device_(std::move(device)),
+      levels_(options.budget_bytes, [this](size_t item, const Error& error) { report_broken(item, error); }),
+      loader_([this](size_t item) { levels_.acquire(item); }) {}
+
+const TracedLevel* LevelStore::serve(uint32_t asset_index, uint32_t slot) {
+  OpenAsset& asset = *assets_[asset_index];
+  const bool wait = residency_ == Residency::Wait;
+  bool was_requested = false;
+  for (uint32_t served = slot; served < asset.traced.slot_count(); ++served) {
+    const size_t item = asset.items[served];
+    const Resident* resident = wait ? levels_.acquire(item) : levels_.try_acquire(item);
+    if (resident) {
+      const TracedLevel* level = static_cast<const LoadedLevel*>(resident)->traced.get();
+      asset.traced.loaded[served].store(level, std::memory_order_release);
+      if (served != slot) fallbacks_.fetch_add(1, std::memory_order_relaxed);
+      return level;
+    }
+    if (!wait && !was_requested && levels_.state(item) == ItemState::Empty) {
+      loader_.request(item);
+      was_requested = true;
+    }
+  }
+  return nullptr;
+}
+
+Result<uint32_t> LevelStore::open(const std::filesystem::path& folder) {
+  for (uint32_t i = 0; i < assets_.size(); ++i) {
+    if (assets_[i]->folder == folder) return i;
+  }
+  loader_.forget();  // its thread must not meet tables that grow, nor take the room of the root
+  FARFIELD_TRY_LET(auto asset, read_asset(folder));
+  if (auto root = load_root(*asset); !root) {
+    refused_.push_back(std::move(asset));
+    return tl::unexpected(root.error());
+  }
+  asset->traced.finest_slot = asset->traced.slot_count() - 1;  // until a plan says otherwise
+  assets_.push_back(std::move(asset));
+  levels_.set_other_bytes(fixed_bytes());
+  return static_cast<uint32_t>(assets_.size() - 1);
+}
+
+Result<void> LevelStore::load_root(OpenAsset& asset) {
+  for (uint32_t slot = 0; slot < asset.traced.slot_count(); ++slot) {
+    ResidencyItem item = make_level_item(asset, slot, *device_);
+    item.load = [this, load = std::move(item.load)] {
+      Result<LoadedItem> loaded = load();
+      if (loaded) count_freed(loaded->build_peak_bytes);
+      return loaded;
+    };
+    asset.items.push_back(levels_.add(std::move(item)));
+    item_owners_.push_back({&asset, slot});
+  }
+  loader_.resize(levels_.size());
+
+  // Roots come first: what an earlier plan has loaded beside them may be in the way, and the next plan decides anew.
+  FARFIELD_TRY_LET(const auto plan, plan_roots(asset));
+  const size_t root = asset.items.back();
+  const uint64_t needed = levels_.resident_bytes(root) + levels_.build_peak_bytes(root) + asset.table_bytes();
+  if (levels_.stats().accounted_bytes + needed > budget_bytes_) apply(plan);
+
+  opening_ = &asset;
+  opening_error_.reset();
+  const bool is_loaded = levels_.acquire(root) != nullptr;
+  opening_ = nullptr;
+  if (!is_loaded) return tl::unexpected(*opening_error_);
+  return {};
+}
+
+/// The plan in which all assets have nothing but their roots.
+Result<Plan> LevelStore::plan_roots(const OpenAsset& newcomer) const {
+  std::vector<PlanAsset> wanted;
+  for (const auto& asset : assets_) wanted.push_back(plan_asset(*asset));
+  wanted.push_back(plan_asset(newcomer));
+  for (PlanAsset& asset : wanted) asset.wanted_lambda = asset.lambda.back();
+  auto plan = plan_levels(wanted, budget_bytes_, fixed_bytes() + newcomer.table_bytes());
+  if (plan) plan->finest.pop_back();  // apply() knows the newcomer not yet
+  return plan;
+}
+
+PlanAsset LevelStore::plan_asset(const OpenAsset& asset) const {
+  PlanAsset wanted;
+  for (const size_t item : asset.items) {
+    const bool is_lost = levels_.state(item) == ItemState::Broken;  // a coarser one serves: it takes nothing
+    wanted.resident_bytes.push_back(is_lost ? 0 : levels_.resident_bytes(item));
+    wanted.build_peak_bytes.push_back(is_lost ? 0 : levels_.build_peak_bytes(item));
+  }
+  wanted.lambda = asset.traced.level_numbers;
+  wanted.wanted_lambda = wanted.lambda.back();  // if it has no instances
+  wanted.pixels = 0.0;
+  return wanted;
+}
+
+void LevelStore::apply(const Plan& plan) {
+  loader_.forget();
+  std::vector<size_t> dropped;
+  for (size_t i = 0; i < plan.finest.size(); ++i) {
+    OpenAsset& asset = *assets_[i];
+    asset.traced.finest_slot = plan.finest[i];
+    for (uint32_t slot = 0; slot < asset.traced.slot_count(); ++slot) {
+      const bool is_refused = levels_.state(asset.items[slot]) == ItemState::Refused;  // this plan may have room for it
+      if (slot < plan.finest[i] || is_refused) {
+        asset.traced.loaded[slot].store(nullptr, std::memory_order_relaxed);  // no ray in flight
+        dropped.push_back(asset.items[slot]);
+      }
+    }
+  }
+  const uint64_t before = levels_.stats().accounted_bytes;
+  levels_.release(dropped);
+  count_freed(before - levels_.stats().accounted_bytes);
+  levels_.set_other_bytes(fixed_bytes());
+}
+
+void LevelStore::load(uint32_t asset, uint32_t slot) {
+  const size_t item = assets_[asset]->items[slot];
+  if (residency_ == Residency::Wait) {
+    levels_.acquire(item);
+  } else {
+    loader_.request(item);
+  }
+}
+
+uint64_t LevelStore::fixed_bytes() const {
+  uint64_t bytes = kRuntimeBytes + instance_bytes_;
+  for (const auto& asset : assets_) bytes += asset->table_bytes();
+  return bytes;
+}
+
+/// Builds and releases leave holes in the heap, which `ps` still counts.
+void LevelStore::count_freed(uint64_t bytes) {
+  const uint64_t freed = freed_bytes_.fetch_add(bytes, std::memory_order_relaxed) + bytes;
+  if (freed < budget_bytes_ / kTrimShare) return;
+  freed_bytes_.store(0, std::memory_order_relaxed);
+  malloc_trim(0);
+}
+
+void LevelStore::report_broken(size_t item, const Error& error) {
+  const ItemOwner& owner = item_owners_[item];
+  if (owner.asset == opening_) {
+    opening_error_ = error;  // open_asset() returns it
+    return;
+  }
+  messages_.report(error.code == ErrorCode::OutOfBudget ? Severity::Warning : Severity::Error,
+                   fmt::format("{}: level {} is left out, a coarser one serves in its place: {}", owner.asset->name,
+                               owner.asset->levels[owner.slot].level, error.message));
+}
+
+}  // namespace farfield

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// The open assets and their levels: opened, loaded when rays need them, released when a plan drops them.
+//
+// What the budget pays for, besides the levels: instance records, the host's BVH over them, the tables of open assets.
+// Between frames apply() first gives back what the new plan does not allow, so what it does allow always fits.
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "base/result.h"
+#include "bvh/bvh_device.h"
+#include "bvh/traced_asset.h"
+#include "cache/loader_thread.h"
+#include "cache/residency.h"
+#include "lodselect/planner.h"
+#include "runtime/messages.h"
+#include "runtime/open_asset.h"
+
+namespace farfield {
+
+/// serve() and stats() are safe from any thread while rays fly; the rest is for one thread, between frames.
+class LevelStore final : public LevelSource {
+ public:
+  LevelStore(std::unique_ptr<BvhDevice> device, const RuntimeOptions& options, Messages& messages);
+
+  // Rays
+  const TracedLevel* serve(uint32_t asset, uint32_t slot) override;
+
+  // Between frames
+  /// The asset in a (canonical) folder, opened with its root if it is not yet. Errors: those of Runtime::open_asset.
+  Result<uint32_t> open(const std::filesystem::path& folder);
+  size_t asset_count() const { return assets_.size(); }
+  const OpenAsset& asset(uint32_t i) const { return *assets_[i]; }
+
+  /// What all instances take, here and in the host's scene.
+  void set_instance_bytes(uint64_t bytes) { instance_bytes_ = bytes; }
+  /// What the budget pays for besides levels.
+  uint64_t fixed_bytes() const;
+
+  /// Sizes and numbers of an asset's levels, as if it had no instance.
+  PlanAsset plan_asset(uint32_t i) const { return plan_asset(*assets_[i]); }
+  /// Ends what is being loaded ahead, so that sizes no longer change.
+  void stop_loading() { loader_.forget(); }
+  /// Allows what the plan allows and gives back the rest.
+  void apply(const Plan& plan);
+  /// Loads a level that the plan allows; in progressive mode only asks for it.
+  void load(uint32_t asset, uint32_t slot);
+
+  ResidencyStats stats() const { return levels_.stats(); }
+  uint64_t fallbacks() const { return fallbacks_.load(std::memory_order_relaxed); }
+
+ private:
+  struct ItemOwner {
+    OpenAsset* asset;
+    uint32_t slot;
+  };
+
+  PlanAsset plan_asset(const OpenAsset& asset) const;
+  Result<void> load_root(OpenAsset& asset);
+  Result<Plan> plan_roots(const OpenAsset& newcomer) const;
+  void count_freed(uint64_t bytes);
+  void report_broken(size_t item, const Error& error);
+
+  const uint64_t budget_bytes_;
+  const Residency residency_;
+  Messages& messages_;
+  uint64_t instance_bytes_ = 0;
+  std::unique_ptr<BvhDevice> device_;
+  std::vector<std::unique_ptr<OpenAsset>> assets_;
+  std::vector<std::unique_ptr<OpenAsset>> refused_;  ///< did not open; items of levels_ refer to them
+  std::vector<ItemOwner> item_owners_;
+  std::optional<Error> opening_error_;  ///< why the root of the asset being opened did not load
+  const OpenAsset* opening_ = nullptr;
+  ResidentSet levels_;
+  std::atomic<uint64_t> fallbacks_{0};    ///< relaxed: a counter
+  std::atomic<uint64_t> freed_bytes_{0};  ///< since the last malloc_trim; relaxed: a counter
+  LoaderThread loader_;                   ///< last: stops before anything else goes
+};
+
+}  // namespace farfield
