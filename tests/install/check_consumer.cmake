@@ -23,7 +23,7 @@ endif()
 # Nothing but the public headers is installed, and they include nothing that is not.
 file(GLOB_RECURSE headers RELATIVE ${work}/prefix/include ${work}/prefix/include/*)
 foreach(header ${headers})
-  if(NOT header MATCHES "^farfield/[a-z]+\\.h$")
+  if(NOT header MATCHES "^farfield/[a-z_]+\\.h$")
     message(FATAL_ERROR "installed, but not a public header: ${header}")
   endif()
 endforeach()
