@@ -46,6 +46,8 @@ std::string write_remedy(int error, const fs::path& path, uint64_t bytes) {
       return fmt::format("create the folder {} first", folder_of(path).string());
     case EISDIR:
       return "a folder has this name: remove it or choose another";
+    case EEXIST:
+      return "it is no file: choose another name";
     case EFBIG:
       return needs(bytes) + "raise the file size limit (ulimit -f)";
     case EMFILE:
@@ -56,6 +58,13 @@ std::string write_remedy(int error, const fs::path& path, uint64_t bytes) {
   }
 }
 
+/// Whether a rename over the path would lose something else than a file: a device, a pipe, a folder.
+bool is_other_than_file(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::symlink_status(path, error);
+  return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_symlink(status);
+}
+
 }  // namespace
 
 TemporaryFile::TemporaryFile(fs::path target, uint64_t expected_bytes)
@@ -63,6 +72,10 @@ TemporaryFile::TemporaryFile(fs::path target, uint64_t expected_bytes)
       expected_bytes_(expected_bytes),
       folder_(::open(folder_of(target_).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
   if (!note(folder_.get() >= 0)) return;
+  if (is_other_than_file(target_)) {
+    error_ = fs::is_directory(target_) ? EISDIR : EEXIST;
+    return;
+  }
   int fd = -1;
   do {  // in a container each run has the same process id, and a killed one leaves its files
     path_ = temporary_name(target_);

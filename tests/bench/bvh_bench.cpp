@@ -10,12 +10,13 @@
 #include <memory>
 
 #include "bvh/instance_geometry.h"
-#include "tests/support/test_levels.h"
+#include "tests/support/level_builder.h"
+#include "tests/support/random_unit.h"
 
 namespace farfield {
 namespace {
 
-using testing::random_unit;
+using test::random_unit;
 
 constexpr uint32_t kLeaves = 100000;
 constexpr int kRays = 1 << 14;
@@ -35,16 +36,16 @@ LevelData tree() {
     positions.insert(positions.end(), {center - a - b, center + a - b, center + a + b, center - a + b});
     quads.push_back({v, v + 1, v + 2, v + 3});
   }
-  LevelData level = testing::empty_level(0, 2.0f / 64);
-  testing::set_quads(level, std::move(positions), quads);
+  LevelData level = test::empty_level(0, 2.0f / 64);
+  test::set_quads(level, std::move(positions), quads);
   return level;
 }
 
 /// A volume of about the same mean density of leaf area.
 LevelData crown() {
-  LevelData level = testing::empty_level(3, 2.0f / 64);
+  LevelData level = test::empty_level(3, 2.0f / 64);
   const float area_per_volume = kLeaves * 0.012f * 0.012f / (4.0f / 3.0f * kPi);
-  testing::set_volume(
+  test::set_volume(
       level, ivec3(8), vec3(-1.0f),
       [=](int x, int y, int z) {
         const vec3 p = (vec3(x, y, z) + 0.5f) / 32.0f - 1.0f;

@@ -7,7 +7,8 @@
 #include "base/file_io.h"
 #include "cache/level_file.h"
 #include "cache/residency.h"
-#include "tests/support/sample_asset.h"
+#include "tests/support/files.h"
+#include "tests/support/level_builder.h"
 
 namespace farfield {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "prefilter/macrosurface.h"
 #include "prefilter/simplify.h"
-#include "tests/support/test_surfaces.h"
+#include "tests/support/surfaces.h"
 
 namespace farfield {
 namespace {

@@ -6,7 +6,7 @@
 #include "cache/level_file.h"
 #include "cache/level_format.h"
 #include "fuzz_targets.h"
-#include "tests/support/sample_asset.h"
+#include "tests/support/level_image.h"
 
 namespace farfield {
 

@@ -8,7 +8,7 @@
 
 #include "base/random.h"
 #include "fuzz_targets.h"
-#include "tests/support/sample_asset.h"
+#include "tests/support/files.h"
 
 namespace farfield {
 namespace {

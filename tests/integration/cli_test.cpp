@@ -144,7 +144,7 @@ class BadInput : public testing::Test {
   const fs::path folder = fresh_folder("bad_input");
   const std::string bush = (folder / "bush.obj").string();
 
-  void SetUp() override { write_bush_obj(bush, 20); }
+  void SetUp() override { test::write_bush_obj(bush, 20); }
   std::string path(const std::string& name) const { return (folder / name).string(); }
 };
 
@@ -207,7 +207,7 @@ TEST_F(BadInput, GridsThatCannotBeAreRefused) {
 }
 
 TEST_F(BadInput, ABudgetThatCannotDoSaysWhatWould) {
-  write_bush_scene(path("scene.gltf"), 60);
+  test::write_bush_scene(path("scene.gltf"), 60);
   const ProcessOutput output = farfield({"render", path("scene.gltf"), "--size", "8x8", "--spp", "1", "--budget", "1K",
                                          "--finest-grid", "16", "--assets", path("assets"), "-o", path("a.exr")});
   expect_one_line_error(output, "budget");
@@ -215,7 +215,7 @@ TEST_F(BadInput, ABudgetThatCannotDoSaysWhatWould) {
 
 /// A triangle whose base colour is an image.
 std::string textured_glb() {
-  const std::string points = raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), image = png(1, 1, {{255, 0, 0, 255}});
+  const std::string points = test::raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), image = test::png(1, 1, {{255, 0, 0, 255}});
   const Json json = {{"asset", {{"version", "2.0"}}},
                      {"buffers", {{{"byteLength", points.size() + image.size()}}}},
                      {"bufferViews",
@@ -226,7 +226,7 @@ std::string textured_glb() {
                      {"textures", {{{"source", 0}}}},
                      {"materials", {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}}},
                      {"meshes", {{{"primitives", {{{"attributes", {{"POSITION", 0}}}, {"material", 0}}}}}}}};
-  return glb(json.dump(), points + image);
+  return test::glb(json.dump(), points + image);
 }
 
 TEST_F(BadInput, WithoutTheTextureModuleOnlyImagesCannotBeRead) {
@@ -253,7 +253,7 @@ class WholeRoad : public testing::Test {
     folder = fresh_folder("whole_road");
     bush = (folder / "bush.obj").string();
     asset = (folder / "bush.farfield").string();
-    write_bush_obj(bush, 300);
+    test::write_bush_obj(bush, 300);
     const ProcessOutput baked =
         farfield({"bake", bush, "-o", asset, "--finest-grid", "32", "--report", path("bake.json")});
     expect_quiet_success(baked);
@@ -346,7 +346,7 @@ TEST_F(WholeRoad, EvaluateGivesTheSameFiguresForAnyNumberOfThreads) {
 }
 
 TEST_F(WholeRoad, EvaluateWarnsWhenTheSourceIsAnother) {
-  write_bush_obj(path("other.obj"), 200);
+  test::write_bush_obj(path("other.obj"), 200);
   const ProcessOutput output = farfield({"evaluate", asset, "--source", path("other.obj"), "--levels", "3", "--views",
                                          "1", "--spp", "4", "--json", path("other.json")});
   EXPECT_EQ(output.exit_code, 0);
@@ -360,7 +360,7 @@ TEST_F(WholeRoad, EvaluateRefusesLevelsThatAreNotThere) {
 }
 
 TEST_F(WholeRoad, RenderAndShotOfAScene) {
-  write_bush_scene(path("scene.gltf"), 120);
+  test::write_bush_scene(path("scene.gltf"), 120);
   const std::vector<std::string> common = {"--size", "48x32",    "--spp",        "4",        "--finest-grid",
                                            "32",     "--assets", path("assets"), "--budget", "64M"};
   std::vector<std::string> render = {"render", path("scene.gltf"), "--frame", "12", "-o", path("frame.exr")};
@@ -388,7 +388,7 @@ TEST_F(WholeRoad, RenderAndShotOfAScene) {
 TEST(Interrupt, ABakeStopsInOrderAndGoesOnLater) {
   const fs::path folder = fresh_folder("interrupt_bake");
   const std::string bush = (folder / "bush.obj").string(), asset = (folder / "bush.farfield").string();
-  write_bush_obj(bush, 5000);
+  test::write_bush_obj(bush, 5000);
   const std::vector<std::string> bake = {"bake", bush, "-o", asset, "--finest-grid", "64"};
   // As soon as its working folder is there: the source has been read, no level is done.
   const auto has_started = [&] { return fs::exists(asset + ".partial"); };
@@ -403,7 +403,7 @@ TEST(Interrupt, ABakeStopsInOrderAndGoesOnLater) {
 
 TEST(Interrupt, AShotKeepsItsFrames) {
   const fs::path folder = fresh_folder("interrupt_shot");
-  write_bush_scene(folder / "scene.gltf", 60);
+  test::write_bush_scene(folder / "scene.gltf", 60);
   const std::vector<std::string> shot = {"shot",
                                          (folder / "scene.gltf").string(),
                                          "--frames",

@@ -1,43 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small glTF files for tests, written into a folder of their own.
+// Small glTF files for tests.
 #pragma once
 
-#include <gtest/gtest.h>
-
+#include <cstdint>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <string>
 #include <vector>
 
-namespace farfield {
-
-/// A folder that is empty at the start and gone at the end.
-class TempFolder {
- public:
-  TempFolder() {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    path_ = std::filesystem::temp_directory_path() /
-            (std::string("farfield_") + test->test_suite_name() + "_" + test->name());
-    std::filesystem::remove_all(path_);
-    std::filesystem::create_directories(path_);
-  }
-  ~TempFolder() { std::filesystem::remove_all(path_); }
-  TempFolder(const TempFolder&) = delete;
-  TempFolder& operator=(const TempFolder&) = delete;
-
-  std::filesystem::path write(const std::string& name, const std::string& content) const {
-    std::filesystem::create_directories((path_ / name).parent_path());
-    // Truncating a file makes some file systems write it out at once: thousands of times that is slow.
-    std::filesystem::remove(path_ / name);
-    std::ofstream(path_ / name, std::ios::binary) << content;
-    return path_ / name;
-  }
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
+namespace farfield::test {
 
 /// The bytes of numbers, as buffers hold them.
 template <typename T>
@@ -58,4 +28,4 @@ inline std::string glb(std::string json, std::string binary) {
   return out;
 }
 
-}  // namespace farfield
+}  // namespace farfield::test

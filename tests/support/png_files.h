@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace farfield {
+namespace farfield::test {
 
 /// An 8-bit RGBA PNG of width * height texels, row by row from the top.
 inline std::string png(uint32_t width, uint32_t height, const std::vector<std::array<uint8_t, 4>>& texels) {
@@ -51,4 +51,4 @@ inline std::string gzip(const std::string& data) {
   return out;
 }
 
-}  // namespace farfield
+}  // namespace farfield::test

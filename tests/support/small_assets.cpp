@@ -4,24 +4,19 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cstring>
 #include <fstream>
 #include <string>
 #include <vector>
 
 #include "base/random.h"
 #include "base/vec.h"
+#include "tests/support/gltf_files.h"
+#include "tests/support/random_unit.h"
 
-namespace farfield {
+namespace farfield::test {
 namespace {
 
 using LeafCorners = std::array<vec3, 4>;
-
-vec3 random_unit(Rng& rng) {
-  const float z = 2.0f * rng.next() - 1.0f, phi = 2.0f * kPi * rng.next();
-  const float radius = std::sqrt(1.0f - z * z);
-  return {radius * std::cos(phi), radius * std::sin(phi), z};
-}
 
 /// Square leaves of side 0.12 in a ball of radius 0.9 around (0, 1.5, 0).
 std::vector<LeafCorners> make_leaves(int count) {
@@ -48,33 +43,17 @@ std::vector<LeafCorners> make_trunk() {
   return sides;
 }
 
-std::string base64(const std::vector<unsigned char>& bytes) {
+std::string base64(const std::string& bytes) {
   const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
   for (size_t i = 0; i < bytes.size(); i += 3) {
     const size_t have = std::min<size_t>(3, bytes.size() - i);
     uint32_t group = 0;
-    for (size_t j = 0; j < 3; ++j) group = group << 8 | (j < have ? bytes[i + j] : 0u);
+    for (size_t j = 0; j < 3; ++j) group = group << 8 | (j < have ? static_cast<uint8_t>(bytes[i + j]) : 0u);
     for (size_t j = 0; j < 4; ++j) text += j <= have ? digits[group >> (18 - 6 * j) & 63] : '=';
   }
   return text;
 }
-
-/// A buffer of floats that grows, for glTF.
-class FloatBuffer {
- public:
-  /// Returns the offset in bytes.
-  size_t append(const std::vector<float>& values) {
-    const size_t offset = bytes_.size();
-    bytes_.resize(offset + values.size() * sizeof(float));
-    std::memcpy(bytes_.data() + offset, values.data(), values.size() * sizeof(float));
-    return offset;
-  }
-  const std::vector<unsigned char>& bytes() const { return bytes_; }
-
- private:
-  std::vector<unsigned char> bytes_;
-};
 
 }  // namespace
 
@@ -101,10 +80,11 @@ void write_bush_scene(const std::filesystem::path& path, int leaves) {
   for (const LeafCorners& leaf : make_leaves(leaves))
     for (const int corner : {0, 1, 2, 0, 2, 3})
       for (int axis = 0; axis < 3; ++axis) positions.push_back(leaf[static_cast<size_t>(corner)][axis]);
-  FloatBuffer buffer;
-  buffer.append(positions);
-  const size_t times = buffer.append({0.0f, 1.0f});
-  const size_t path_keys = buffer.append({0, 1.5f, 5.0f, 0, 1.5f, 80.0f});
+  std::string buffer = raw(positions);
+  const size_t times = buffer.size();
+  buffer += raw<float>({0.0f, 1.0f});
+  const size_t path_keys = buffer.size();
+  buffer += raw<float>({0, 1.5f, 5.0f, 0, 1.5f, 80.0f});
   const size_t points = positions.size() / 3;
 
   // fmt's braces and JSON's do not go together: @ marks what is filled in.
@@ -139,9 +119,9 @@ void write_bush_scene(const std::filesystem::path& path, int leaves) {
   fill("@mesh", fmt::format("{}", points * 12));
   fill("@times", fmt::format("{}", times));
   fill("@path", fmt::format("{}", path_keys));
-  fill("@all", fmt::format("{}", buffer.bytes().size()));
-  fill("@data", base64(buffer.bytes()));
+  fill("@all", fmt::format("{}", buffer.size()));
+  fill("@data", base64(buffer));
   std::ofstream(path) << text;
 }
 
-}  // namespace farfield
+}  // namespace farfield::test

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-namespace farfield {
+namespace farfield::test {
 
 /// An OBJ with its MTL: a trunk and `leaves` leaf quads in two greens, about 2 units wide.
 void write_bush_obj(const std::filesystem::path& path, int leaves);
@@ -13,4 +13,4 @@ void write_bush_obj(const std::filesystem::path& path, int leaves);
 /// that draws back from them over one second.
 void write_bush_scene(const std::filesystem::path& path, int leaves);
 
-}  // namespace farfield
+}  // namespace farfield::test

@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <csignal>
 #include <fstream>
@@ -16,7 +15,9 @@
 #include "base/parallel.h"
 #include "bvh/level_scene.h"
 #include "cache/level_file.h"
-#include "tests/support/leaf_cloud.h"
+#include "tests/support/files.h"
+#include "tests/support/random_unit.h"
+#include "tests/support/surfaces.h"
 
 namespace farfield {
 namespace {
@@ -26,17 +27,14 @@ namespace fs = std::filesystem;
 /// A folder of its own for each test, removed afterwards.
 class Bake : public testing::Test {
  protected:
-  void SetUp() override {
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() / ("farfield_" + std::string(info->name()) + "_" + std::to_string(::getpid()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   fs::path out() const { return folder_ / "thing.farfield"; }
   fs::path partial() const { return folder_ / "thing.farfield.partial"; }
-  fs::path folder_;
+
+ private:
+  test::TemporaryFolder temporary_;
+
+ protected:
+  const fs::path folder_ = temporary_.path();
 };
 
 /// Bytes of the arrays: stands for what the runtime would measure.
@@ -224,7 +222,7 @@ TEST_F(Bake, StoresAHullThatContainsAllLevels) {
   }
   Rng rng(1);
   for (int i = 0; i < 300; ++i) {
-    const vec3 direction = test::random_direction(rng);
+    const vec3 direction = test::random_unit(rng);
     float furthest = -INFINITY, furthest_hull = -INFINITY;
     for (const vec3& p : points) furthest = std::max(furthest, glm::dot(p, direction));
     for (const vec3& p : manifest->hull) furthest_hull = std::max(furthest_hull, glm::dot(p, direction));
@@ -530,23 +528,21 @@ void expect_refused(const fs::path& out, const std::string& stranger) {
   EXPECT_FALSE(fs::exists(out.string() + ".partial"));
 }
 
-void write_file(const fs::path& path, const std::string& text) { std::ofstream(path) << text; }
-
 TEST_F(Bake, NeverReplacesAFolderWithSomebodyElsesManifest) {
   fs::create_directories(out());
   for (const char* text : {R"({"name": "a web app", "start_url": "/"})", R"({"version": 1, "generator": "vite"})",
                            R"({"version": 1, "generator": 7})", "[]", "no JSON", ""}) {
-    write_file(out() / "manifest.json", text);
+    test::write_text(out() / "manifest.json", text);
     expect_refused(out(), "manifest.json is not Farfield's");
   }
-  write_file(out() / "index.html", "<html>");
+  test::write_text(out() / "index.html", "<html>");
   expect_refused(out(), "index.html");
 }
 
 TEST_F(Bake, NeverReplacesAnAssetWithOtherFilesInIt) {
   ASSERT_TRUE(bake(ball_in_leaves(), "thing", out(), small_options()).has_value());
   for (const char* name : {"notes.txt", "level_1.ffl.bak", "level_.ffl", "manifest.json.tmp", ".hidden"}) {
-    write_file(out() / name, "mine");
+    test::write_text(out() / name, "mine");
     expect_refused(out(), name);
     fs::remove(out() / name);
   }
@@ -559,7 +555,7 @@ TEST_F(Bake, NeverReplacesAnAssetWithOtherFilesInIt) {
 
 TEST_F(Bake, AFileThatDoesNotBelongDoesNoHarmWhileTheAssetIsUpToDate) {
   ASSERT_TRUE(bake(two_triangles(), "x", out(), small_options()).has_value());
-  write_file(out() / "notes.txt", "mine");
+  test::write_text(out() / "notes.txt", "mine");
   const auto report = bake(two_triangles(), "x", out(), small_options());
   ASSERT_TRUE(report.has_value()) << report.error().message;
   EXPECT_TRUE(report->up_to_date);
@@ -567,7 +563,7 @@ TEST_F(Bake, AFileThatDoesNotBelongDoesNoHarmWhileTheAssetIsUpToDate) {
 
 TEST_F(Bake, RefusesWhatIsNoAssetBeforeItReadsTheSource) {
   fs::create_directories(out());
-  write_file(out() / "thesis.tex", "years of work");
+  test::write_text(out() / "thesis.tex", "years of work");
   const auto report = bake(folder_ / "missing.obj", out(), small_options());
   ASSERT_FALSE(report.has_value());
   EXPECT_EQ(report.error().code, ErrorCode::InvalidArgument);
@@ -577,7 +573,7 @@ TEST_F(Bake, KeepsAFileThatWasPutIntoTheOldAssetMeanwhile) {
   ASSERT_TRUE(bake(two_triangles(), "x", out(), small_options()).has_value());
   BakeOptions options = small_options();
   options.job.progress = [&](double, const std::string& stage) {
-    if (stage == "level 4: write") write_file(out() / "notes.txt", "mine");
+    if (stage == "level 4: write") test::write_text(out() / "notes.txt", "mine");
   };
   const auto report = bake(ball_in_leaves(), "thing", out(), options);
   ASSERT_FALSE(report.has_value());
@@ -593,9 +589,9 @@ TEST_F(Bake, ReplacesDamagedAndNewerAssetsAndWhatKilledWritersLeft) {
   for (const std::string& damaged :
        {std::string(), manifest.substr(0, 100), std::string(500, '\0'),
         std::string(R"({"version": 99, "generator": "farfield 9.0.0", "levels": "elsewhere"})")}) {
-    write_file(out() / "manifest.json", damaged);
-    write_file(out() / "manifest.json.tmp-17-3", "half");
-    write_file(out() / "level_0.ffl.tmp-17-2", "half");
+    test::write_text(out() / "manifest.json", damaged);
+    test::write_text(out() / "manifest.json.tmp-17-3", "half");
+    test::write_text(out() / "level_0.ffl.tmp-17-2", "half");
     const auto report = bake(two_triangles(), "x", out(), small_options());
     ASSERT_TRUE(report.has_value()) << report.error().message;
     EXPECT_EQ(files_of(out()), whole);

@@ -9,7 +9,7 @@
 #include <set>
 
 #include "cache/level_check.h"
-#include "tests/support/leaf_cloud.h"
+#include "tests/support/surfaces.h"
 
 namespace farfield {
 namespace {

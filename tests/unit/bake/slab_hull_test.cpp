@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "base/random.h"
-#include "tests/support/leaf_cloud.h"
+#include "tests/support/random_unit.h"
 
 namespace farfield {
 namespace {
@@ -30,7 +30,7 @@ void expect_contains(const std::vector<vec3>& points) {
   ASSERT_GE(corners.size(), 4u);
   EXPECT_LE(corners.size(), 150u);
   Rng rng(5);
-  for (int i = 0; i < 500; ++i) EXPECT_LE(excess(points, corners, test::random_direction(rng)), 0);
+  for (int i = 0; i < 500; ++i) EXPECT_LE(excess(points, corners, test::random_unit(rng)), 0);
 }
 
 TEST(SlabHull, ContainsRandomPointsInEveryDirection) {
@@ -38,7 +38,7 @@ TEST(SlabHull, ContainsRandomPointsInEveryDirection) {
     Rng rng(seed);
     std::vector<vec3> points;
     const vec3 stretch(1, std::pow(10.0f, -4 * rng.next()), std::pow(10.0f, -4 * rng.next()));
-    for (int i = 0; i < 200; ++i) points.push_back(stretch * test::random_direction(rng) * rng.next());
+    for (int i = 0; i < 200; ++i) points.push_back(stretch * test::random_unit(rng) * rng.next());
     expect_contains(points);
   }
 }
@@ -57,7 +57,7 @@ TEST(SlabHull, IsTightAroundABall) {
   // Slabs 25 axes wide cut off nearly all of a box's corners: its widest reach is 12 % beyond a unit ball.
   Rng rng(1);
   std::vector<vec3> points;
-  for (int i = 0; i < 20000; ++i) points.push_back(test::random_direction(rng));
+  for (int i = 0; i < 20000; ++i) points.push_back(test::random_unit(rng));
   float furthest = 0;
   for (const vec3& corner : corners_of(points)) furthest = std::max(furthest, glm::length(corner));
   EXPECT_LT(furthest, 1.15f);

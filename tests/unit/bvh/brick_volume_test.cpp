@@ -7,15 +7,17 @@
 #include <limits>
 
 #include "base/hash.h"
-#include "tests/support/test_levels.h"
+#include "tests/support/level_builder.h"
+#include "tests/support/optical_depth.h"
+#include "tests/support/random_unit.h"
 
 namespace farfield {
 namespace {
 
-using testing::empty_level;
-using testing::optical_depth;
-using testing::random_unit;
-using testing::set_volume;
+using test::empty_level;
+using test::optical_depth;
+using test::random_unit;
+using test::set_volume;
 
 constexpr float kInf = std::numeric_limits<float>::infinity();
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -294,7 +296,7 @@ TEST(BrickVolume, RaysWithoutADirectionOrWithNansMeetNothing) {
 
 TEST(BrickVolume, AnEmptyVolumeHasNoCollisions) {
   EXPECT_FALSE(BrickVolume().first_collision({vec3(0.0f), vec3(1.0f), 0.0f, kInf}, 1));
-  const LevelData surface_only = testing::triangle_soup(3, 0.1f, 1);
+  const LevelData surface_only = test::triangle_soup(3, 0.1f, 1);
   EXPECT_TRUE(BrickVolume(view_of(surface_only)).is_empty());
 }
 

@@ -10,15 +10,17 @@
 
 #include "base/hash.h"
 #include "base/parallel.h"
-#include "tests/support/test_levels.h"
+#include "tests/support/level_builder.h"
+#include "tests/support/optical_depth.h"
+#include "tests/support/random_unit.h"
 
 namespace farfield {
 namespace {
 
-using testing::random_unit;
-using testing::set_volume;
-using testing::sphere_level;
-using testing::triangle_soup;
+using test::random_unit;
+using test::set_volume;
+using test::sphere_level;
+using test::triangle_soup;
 
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
@@ -207,8 +209,8 @@ TEST(InstanceGeometry, HitsWhatTheFlattenedQuadsHit) {
 }
 
 TEST(InstanceGeometry, TellsWhichFaceWasHit) {
-  LevelData level = testing::empty_level(0, 1.0f);
-  testing::set_quads(level, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2, 3}});
+  LevelData level = test::empty_level(0, 1.0f);
+  test::set_quads(level, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2, 3}});
   Stage stage;
   stage.add_instance(stage.add_asset({&level}), mat4x3(1.0f));
   const RTCScene scene = stage.scene();
@@ -341,7 +343,7 @@ TEST(InstanceGeometry, PacketsAndStreamsSeeTheSameDistancesAsSingleRays) {
 }
 
 TEST(InstanceGeometry, VolumesKeepTheirTransmittanceUnderAnyAffineTransform) {
-  LevelData level = testing::empty_level(0, 0.125f);
+  LevelData level = test::empty_level(0, 0.125f);
   const SymMat3 s = SymMat3::outer(glm::normalize(vec3(1, 2, 3))) + SymMat3::identity() * 0.05f;
   set_volume(
       level, {1, 1, 1}, vec3(0.0f), [](int, int, int) { return 2.5f; }, [&](int, int, int) { return s; });
@@ -355,7 +357,7 @@ TEST(InstanceGeometry, VolumesKeepTheirTransmittanceUnderAnyAffineTransform) {
     const vec3 to_local = vec3(0.5f) + 0.3f * random_unit(rng);
     const vec3 origin = apply(transform, from_local);
     const vec3 direction = glm::normalize(apply(transform, to_local) - origin);  // unit in the world, as hosts trace
-    const double depth = testing::optical_depth(level, from_local, 4.0f * (to_local - from_local), 1.0);
+    const double depth = test::optical_depth(level, from_local, 4.0f * (to_local - from_local), 1.0);
 
     constexpr int kRays = 20000;
     int passed = 0;
@@ -407,7 +409,7 @@ TEST(InstanceGeometry, TheNearestOfSurfaceAndVolumeWins) {
 }
 
 TEST(InstanceGeometry, InstancesOfOneAssetHaveIndependentFreeFlights) {
-  LevelData level = testing::empty_level(0, 0.125f);
+  LevelData level = test::empty_level(0, 0.125f);
   set_volume(level, {1, 1, 1}, vec3(0.0f), [](int, int, int) { return 0.7f; });
   Stage stage;
   const uint32_t asset = stage.add_asset({&level});

@@ -4,12 +4,12 @@
 #include <gtest/gtest.h>
 
 #include "base/parallel.h"
-#include "tests/support/test_levels.h"
+#include "tests/support/level_builder.h"
 
 namespace farfield {
 namespace {
 
-using testing::triangle_soup;
+using test::triangle_soup;
 
 TEST(LevelScene, TakesTheSameBytesEveryTimeAndGivesThemAllBack) {
   auto device = BvhDevice::create();
@@ -65,12 +65,12 @@ TEST(LevelScene, OurDeviceKeepsTheThreadLimitThatItFinds) {
 TEST(LevelScene, ALevelWithoutSurfaceHasNoScene) {
   auto device = BvhDevice::create();
   ASSERT_TRUE(device);
-  LevelData level = testing::empty_level(3, 1.0f);
+  LevelData level = test::empty_level(3, 1.0f);
   const auto nothing = LevelScene::build(**device, view_of(level));
   ASSERT_TRUE(nothing);
   EXPECT_EQ(nothing->handle(), nullptr);
   EXPECT_EQ(nothing->bytes(), 0u);
-  testing::set_volume(level, {1, 1, 1}, vec3(0.0f), [](int, int, int) { return 1.0f; });
+  test::set_volume(level, {1, 1, 1}, vec3(0.0f), [](int, int, int) { return 1.0f; });
   const auto cost = measure_level_scene(**device, view_of(level));
   ASSERT_TRUE(cost);
   EXPECT_GE(cost->resident_bytes, sizeof(Brick) + sizeof(uint32_t));
@@ -80,8 +80,8 @@ TEST(LevelScene, ALevelWithoutSurfaceHasNoScene) {
 TEST(LevelScene, DegenerateQuadsAreNoError) {
   auto device = BvhDevice::create();
   ASSERT_TRUE(device);
-  LevelData level = testing::empty_level(0, 1.0f);
-  testing::set_triangles(level, {vec3(0.0f), vec3(1.0f), vec3(1.0f)}, {{0, 0, 0}, {1, 2, 1}, {0, 1, 2}});
+  LevelData level = test::empty_level(0, 1.0f);
+  test::set_triangles(level, {vec3(0.0f), vec3(1.0f), vec3(1.0f)}, {{0, 0, 0}, {1, 2, 1}, {0, 1, 2}});
   const auto scene = LevelScene::build(**device, view_of(level));
   ASSERT_TRUE(scene);
   EXPECT_NE(scene->handle(), nullptr);

@@ -10,8 +10,10 @@
 
 #include "cache/level_file.h"
 #include "cache/manifest.h"
+#include "tests/support/asset_writer.h"
 #include "tests/support/file_size_limit.h"
-#include "tests/support/sample_asset.h"
+#include "tests/support/files.h"
+#include "tests/support/level_builder.h"
 
 namespace farfield {
 namespace {

@@ -13,7 +13,9 @@
 #include "base/hash.h"
 #include "base/random.h"
 #include "cache/level_format.h"
-#include "tests/support/sample_asset.h"
+#include "tests/support/files.h"
+#include "tests/support/level_builder.h"
+#include "tests/support/level_image.h"
 
 namespace farfield {
 namespace {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "cache/level_format.h"
-#include "tests/support/sample_asset.h"
+#include "tests/support/level_builder.h"
 
 namespace farfield {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "base/random.h"
 #include "cache/level_format.h"
-#include "tests/support/sample_asset.h"
+#include "tests/support/level_builder.h"
 
 namespace farfield {
 namespace {

@@ -8,7 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/random.h"
-#include "tests/support/sample_asset.h"
+#include "tests/support/asset_writer.h"
+#include "tests/support/files.h"
 
 namespace farfield {
 namespace {

@@ -10,7 +10,8 @@
 #include "cache/level_file.h"
 #include "cache/level_format.h"
 #include "cache/manifest.h"
-#include "tests/support/sample_asset.h"
+#include "tests/support/asset_writer.h"
+#include "tests/support/files.h"
 
 namespace farfield {
 namespace {

@@ -7,10 +7,13 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include "tests/support/files.h"
 #include "tests/support/gltf_files.h"
 
 namespace farfield {
 namespace {
+
+using namespace test;
 
 namespace fs = std::filesystem;
 
@@ -87,7 +90,7 @@ TEST(GltfScene, ForestCameraPullsBackBy64AlongItsFormula) {
 }
 
 TEST(GltfScene, WorldTransformIsTheProductAlongTheChain) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto file = folder.write("chain.glb", scene_file(R"({"translation":[1,2,3],"children":[1]},
           {"rotation":[0,0.70710678,0,0.70710678],"scale":[2,3,4],"children":[2]},
           {"matrix":[1,0,0,0, 0,0,1,0, 0,-1,0,0, 5,6,7,1],"mesh":0})",
@@ -105,7 +108,7 @@ TEST(GltfScene, WorldTransformIsTheProductAlongTheChain) {
 }
 
 TEST(GltfScene, CameraBasisIsOrthonormalUnderScaleAndMirror) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto file = folder.write(
       "camera.glb",
       scene_file(R"({"scale":[-2,3,0.5],"rotation":[0.1,0.2,0.3,0.927],"children":[1]},
@@ -142,7 +145,7 @@ std::string animated_file(const std::string& interpolation, const std::vector<fl
 }
 
 TEST(GltfScene, LinearKeysInterpolateStraightAndRotationsTheShortWay) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   // The last rotation has its sign flipped: the same turn, which must not make the camera go the long way round.
   const float h = std::sqrt(0.5f);
   const auto file = folder.write(
@@ -163,7 +166,7 @@ TEST(GltfScene, LinearKeysInterpolateStraightAndRotationsTheShortWay) {
 }
 
 TEST(GltfScene, StepKeysHold) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto file = folder.write(
       "step.glb", animated_file("STEP", {0, 0, 0, 4, 0, 0, 4, 8, 0}, {0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 1}));
   const auto scene = read_gltf_scene(file);
@@ -182,14 +185,14 @@ TEST(GltfScene, CubicSplineReproducesACubic) {
     for (const float value : {slope(t), x(t), slope(t)}) moves.insert(moves.end(), {value, 0, 0});
     turns.insert(turns.end(), {0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0});
   }
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto scene = read_gltf_scene(folder.write("cubic.glb", animated_file("CUBICSPLINE", moves, turns)));
   ASSERT_TRUE(scene) << scene.error().message;
   for (const double t : {0.0, 0.3, 1.0, 1.7, 2.9, 3.0}) EXPECT_NEAR(scene->camera_at(0, t).position.x, x(t), 2e-5) << t;
 }
 
 TEST(GltfScene, AnimationWithBrokenKeysIsRefused) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   std::string broken = animated_file("LINEAR", {0, 0, 0, 4, 0, 0, 4, 8, 0}, {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1});
   const std::string times = raw<float>({0, 1, 3}), falling = raw<float>({0, 3, 1});
   broken.replace(broken.find(times), times.size(), falling);
@@ -203,7 +206,7 @@ TEST(GltfScene, AnimationWithBrokenKeysIsRefused) {
 }
 
 TEST(GltfScene, NodeCyclesAndSharedChildrenAreRefused) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   for (const char* nodes : {R"({"children":[1]},{"children":[0]})", R"({"children":[0]})",
                             R"({"children":[2]},{"children":[2]},{"mesh":0})", R"({"children":[7]})"}) {
     const auto scene = read_gltf_scene(folder.write("bad.glb", scene_file(nodes, "0")));
@@ -216,7 +219,7 @@ TEST(GltfScene, NodeCyclesAndSharedChildrenAreRefused) {
 TEST(GltfScene, ChainOf5000NodesIsWalkedWithoutRecursion) {
   std::string nodes;
   for (int i = 0; i < 4999; ++i) nodes += fmt::format(R"({{"translation":[0,0,0.5],"children":[{}]}},)", i + 1);
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto scene = read_gltf_scene(folder.write("deep.glb", scene_file(nodes + R"({"mesh":0})", "0")));
   ASSERT_TRUE(scene) << scene.error().message;
   ASSERT_EQ(scene->instances.size(), 1u);
@@ -224,7 +227,7 @@ TEST(GltfScene, ChainOf5000NodesIsWalkedWithoutRecursion) {
 }
 
 TEST(GltfScene, DeepJsonIsRefusedBeforeAnyRecursiveParser) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const std::string deep = std::string(200000, '[') + std::string(200000, ']');
   const auto scene = read_gltf_scene(folder.write("deep.gltf", R"({"asset":{"version":"2.0"},"extras":)" + deep + "}"));
   ASSERT_FALSE(scene);
@@ -232,7 +235,7 @@ TEST(GltfScene, DeepJsonIsRefusedBeforeAnyRecursiveParser) {
 }
 
 TEST(GltfScene, SingularInstancesAreLeftOutWithAWarning) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto scene = read_gltf_scene(folder.write(
       "flat.glb", scene_file(R"({"mesh":0,"scale":[0,1,1]},{"mesh":0,"matrix":[0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0]},
           {"mesh":0,"scale":[-1,2,0.5],"rotation":[0,0,0,0]})",
@@ -243,7 +246,7 @@ TEST(GltfScene, SingularInstancesAreLeftOutWithAWarning) {
 }
 
 TEST(GltfScene, LightsKeepTheirPhotometricValueAndDirection) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto scene = read_gltf_scene(folder.write(
       "lights.glb",
       scene_file(R"({"rotation":[-0.70710678,0,0,0.70710678],"extensions":{"KHR_lights_punctual":{"light":0}}},
@@ -265,7 +268,7 @@ TEST(GltfScene, LightsKeepTheirPhotometricValueAndDirection) {
 }
 
 TEST(GltfScene, AssetNamesAreUniqueAndFitForFiles) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   std::string file = scene_file(R"({"mesh":0})", "0");
   const std::string one = R"({"name":"tri","primitives":[{"attributes":{"POSITION":0}}]})";
   std::string meshes;

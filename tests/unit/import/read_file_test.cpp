@@ -3,16 +3,18 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/gltf_files.h"
+#include "tests/support/files.h"
 #include "tests/support/png_files.h"
 
 namespace farfield {
 namespace {
 
+using namespace test;
+
 std::string text(const std::vector<unsigned char>& bytes) { return {bytes.begin(), bytes.end()}; }
 
 TEST(ReadFile, GivesPlainAndGzippedContentAlike) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const std::string content(100000, 'x');
   EXPECT_EQ(text(*read_file(folder.write("plain.txt", content))), content);
   EXPECT_EQ(text(*read_file(folder.write("packed.gz", gzip(content)))), content);
@@ -24,7 +26,7 @@ TEST(ReadFile, GivesPlainAndGzippedContentAlike) {
 }
 
 TEST(ReadFile, EveryTruncationOfGzipIsAnError) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   std::string content;
   for (int i = 0; i < 200; ++i) content += std::to_string(i * i) + " ";
   const std::string packed = gzip(content);
@@ -36,7 +38,7 @@ TEST(ReadFile, EveryTruncationOfGzipIsAnError) {
 }
 
 TEST(ReadFile, FlippedBitsInGzipNeverChangeTheContentUnnoticed) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const std::string content = std::string(3000, 'a') + "some end", packed = gzip(content);
   for (size_t bit = 8 * 10; bit < 8 * packed.size(); ++bit) {  // behind the header, whose fields may mean nothing
     std::string broken = packed;
@@ -47,7 +49,7 @@ TEST(ReadFile, FlippedBitsInGzipNeverChangeTheContentUnnoticed) {
 }
 
 TEST(ReadFile, BombIsRefusedBeforeItUnpacks) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   // 300 MB of zeros pack to 0.3 MB; beyond 256 MiB that is no mesh.
   const std::string bomb = gzip(std::string(300'000'000, '\0'));
   ASSERT_LT(bomb.size(), 500'000u);
@@ -58,7 +60,7 @@ TEST(ReadFile, BombIsRefusedBeforeItUnpacks) {
 }
 
 TEST(ReadFile, WhatIsNoRegularFileIsAnError) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   EXPECT_EQ(read_file(folder.path() / "missing.obj").error().code, ErrorCode::NotFound);
   EXPECT_EQ(read_file(folder.path()).error().code, ErrorCode::Io);
   EXPECT_EQ(read_file("/dev/zero").error().code, ErrorCode::Io);

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "import/texture.h"
-#include "tests/support/gltf_files.h"
+#include "tests/support/files.h"
 #include "tests/support/png_files.h"
 
 namespace farfield {
@@ -24,7 +24,7 @@ std::string failure_of(const std::vector<fs::path>& folders) {
 }
 
 TEST(TextureModule, AMissingOneIsAnErrorThatNamesEveryPlace) {
-  const TempFolder folder;
+  const test::TemporaryFolder folder;
   const std::string message = failure_of({folder.path() / "one", folder.path() / "two"});
   for (const char* place : {"one/farfield_textures.so", "two/farfield_textures.so"})
     EXPECT_NE(message.find((folder.path() / place).string()), std::string::npos) << message;
@@ -32,13 +32,13 @@ TEST(TextureModule, AMissingOneIsAnErrorThatNamesEveryPlace) {
 }
 
 TEST(TextureModule, OneThatDoesNotLoadIsAnErrorAndNotPassedOver) {
-  const TempFolder folder;
+  const test::TemporaryFolder folder;
   const fs::path broken = folder.write("farfield_textures.so", "not a library");
   EXPECT_NE(failure_of({folder.path(), FARFIELD_TEXTURE_MODULE_FOLDER}).find(broken.string()), std::string::npos);
 }
 
 TEST(TextureModule, ALibraryWithoutTheEntryIsOfAnotherVersion) {
-  const TempFolder folder;
+  const test::TemporaryFolder folder;
   fs::copy_file(FARFIELD_OTHER_LIBRARY, folder.path() / "farfield_textures.so");
   EXPECT_NE(failure_of({folder.path()}).find("version"), std::string::npos);
 }
@@ -57,7 +57,7 @@ TEST(TextureModule, TheVariableReplacesThePlaces) {
 }
 
 TEST(TextureModule, ThreadsThatReadTheFirstImageTogetherAllGetIt) {
-  const std::string bytes = png(2, 1, {{255, 0, 0, 255}, {0, 0, 255, 255}});
+  const std::string bytes = test::png(2, 1, {{255, 0, 0, 255}, {0, 0, 255, 255}});
   const std::span<const unsigned char> view(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
   std::vector<std::string> wrong(8);
   std::vector<std::thread> threads;

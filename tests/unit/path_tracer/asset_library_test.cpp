@@ -8,7 +8,7 @@
 #include <iterator>
 #include <thread>
 
-#include "tests/support/sample_asset.h"
+#include "tests/support/files.h"
 
 namespace farfield {
 namespace {

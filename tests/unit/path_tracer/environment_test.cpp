@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "path_tracer/preetham_sky.h"
-#include "tests/support/sample_asset.h"
+#include "tests/support/files.h"
 #include "tests/support/statistics.h"
 
 namespace farfield {

@@ -10,7 +10,7 @@
 #include "base/random.h"
 #include "import/texture_module.h"
 #include "tests/support/file_size_limit.h"
-#include "tests/support/sample_asset.h"
+#include "tests/support/files.h"
 
 namespace farfield {
 namespace {

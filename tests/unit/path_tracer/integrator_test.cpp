@@ -10,8 +10,10 @@
 #include "base/parallel.h"
 #include "path_tracer/asset_view.h"
 #include "path_tracer/embree_handles.h"
+#include "tests/support/files.h"
 #include "tests/support/image_statistics.h"
-#include "tests/support/test_asset.h"
+#include "tests/support/level_builder.h"
+#include "tests/support/runtime_host.h"
 
 namespace farfield {
 namespace {
@@ -22,11 +24,11 @@ constexpr float kAllLevels[] = {0, 0.5f, 1, 2, 2.5f, 3, 4.5f, 5};
 class PathTrace : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = new testing::TemporaryFolder;
-    std::vector<LevelData> levels = testing::white_sphere(32);
-    testing::write_asset(white(), levels);
-    for (LevelData& level : levels) testing::set_diffuse(level, vec3(0.7f, 0.4f, 0.1f));
-    testing::write_asset(brown(), levels);
+    folder_ = new test::TemporaryFolder;
+    std::vector<LevelData> levels = test::white_sphere(32);
+    test::write_asset(white(), levels);
+    for (LevelData& level : levels) test::set_diffuse(level, vec3(0.7f, 0.4f, 0.1f));
+    test::write_asset(brown(), levels);
   }
   static void TearDownTestSuite() {
     delete folder_;
@@ -59,9 +61,9 @@ class PathTrace : public ::testing::Test {
     return {Environment::sun_sky(options), {}};
   }
 
-  static testing::TemporaryFolder* folder_;
+  static test::TemporaryFolder* folder_;
 };
-testing::TemporaryFolder* PathTrace::folder_ = nullptr;
+test::TemporaryFolder* PathTrace::folder_ = nullptr;
 
 TEST_F(PathTrace, WhiteFurnaceIsOneForEachPathAtEveryLevel) {
   // Without next-event estimation every path ends in the light with the throughput 1: no noise at all.

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "path_tracer/image.h"
-#include "tests/support/sample_asset.h"
+#include "tests/support/files.h"
 
 namespace farfield {
 namespace {

@@ -9,8 +9,9 @@
 #include <thread>
 
 #include "path_tracer/image.h"
-#include "tests/support/sample_asset.h"
-#include "tests/support/test_asset.h"
+#include "tests/support/files.h"
+#include "tests/support/level_builder.h"
+#include "tests/support/runtime_host.h"
 
 namespace farfield {
 namespace {
@@ -40,7 +41,7 @@ TEST(ParseFrameRange, RefusesTheRest) {
 class Shot : public ::testing::Test {
  protected:
   Shot() {
-    testing::write_asset(folder_.path() / "prepared", testing::white_sphere());
+    test::write_asset(folder_.path() / "prepared", test::white_sphere());
     test::write_text(folder_.path() / "baker",
                      fmt::format("#!/bin/sh\nrm -rf \"$4\" && cp -r {}/prepared \"$4\"\n", folder_.path().string()));
     std::filesystem::permissions(folder_.path() / "baker", std::filesystem::perms::owner_all);
@@ -118,7 +119,7 @@ TEST_F(Shot, WritesFramesRecordAndSheet) {
 // AddressSanitizer's own memory would count.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 TEST_F(Shot, ResidentSetKeepsTheBudget) {
-  testing::write_asset(folder_.path() / "prepared", testing::white_sphere(160));
+  test::write_asset(folder_.path() / "prepared", test::white_sphere(160));
   options_.budget_bytes = 8 << 20;  // level 0 alone takes 100000 triangles
   const auto report = shoot({0, 24, 3});
   ASSERT_TRUE(report) << report.error().message;

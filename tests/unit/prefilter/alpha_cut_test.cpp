@@ -10,11 +10,14 @@
 
 #include "base/parallel.h"
 #include "prefilter/condition.h"
+#include "tests/support/files.h"
 #include "tests/support/gltf_files.h"
 #include "tests/support/png_files.h"
 
 namespace farfield {
 namespace {
+
+using namespace test;
 
 using AlphaAt = std::function<float(float u, float v)>;
 
@@ -137,7 +140,7 @@ TEST(AlphaCut, StepsOfAStaircaseCostFewTriangles) {
 // ---- as part of a mesh
 
 /// A bent strip of n cards side by side that share vertices, the mask running across all of them, as a glTF file.
-std::filesystem::path write_strip(const TempFolder& folder, int n, const std::string& image) {
+std::filesystem::path write_strip(const TemporaryFolder& folder, int n, const std::string& image) {
   std::vector<float> positions, uvs;
   std::vector<uint16_t> indices;
   for (int i = 0; i <= n; ++i) {
@@ -180,7 +183,7 @@ TEST(AlphaCut, NeighboursFitWithoutCracksOrTJunctions) {
                                                          (static_cast<float>(y) + 0.5f) / size))});
     }
   }
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto asset = import_asset(write_strip(folder, cards, png(size, size, texels)));
   ASSERT_TRUE(asset) << asset.error().message;
   const Surface& s = asset->surface;
@@ -212,7 +215,7 @@ TEST(AlphaCut, NeighboursFitWithoutCracksOrTJunctions) {
 }
 
 TEST(AlphaCut, SameMeshForAnyNumberOfThreads) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   std::vector<std::array<uint8_t, 4>> texels;
   for (int i = 0; i < 64 * 64; ++i) texels.push_back({200, 100, 50, static_cast<uint8_t>((i * 37 / 64) % 256)});
   const auto file = write_strip(folder, 9, png(64, 64, texels));

@@ -8,11 +8,14 @@
 #include <fstream>
 #include <random>
 
+#include "tests/support/files.h"
 #include "tests/support/gltf_files.h"
 #include "tests/support/png_files.h"
 
 namespace farfield {
 namespace {
+
+using namespace test;
 
 namespace fs = std::filesystem;
 
@@ -40,14 +43,14 @@ TEST(ImportObj, FaceOfThousandCornersIsKeptWhole) {
   }
   obj += "f";
   for (int i = 1; i <= n; ++i) obj += fmt::format(" {}", i);
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto asset = import_asset(folder.write("disc.obj", obj));
   ASSERT_TRUE(asset) << asset.error().message;
   EXPECT_EQ(asset->surface.triangles.size(), 998u);
 }
 
 TEST(ImportObj, AllWaysToWriteAFaceAreOne) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   for (const char* face :
        {"f 1 2 3 4", "f 1// 2// 3// 4//", "f 1/1 2/1 3/1 4/1", "f 1//1 2//1 3//1 4//1", "f 1/1/1 2/1/1 3/1/1 4/1/1",
         "f -4 -3 -2 -1", "f\t1 \\\n 2 3 \\\r\n4\r", "f 1/-1/-1 2/-1/-1 3/-1/-1 4/-1/-1", "f 1 2 3 4 # end"}) {
@@ -61,7 +64,7 @@ TEST(ImportObj, AllWaysToWriteAFaceAreOne) {
 }
 
 TEST(ImportObj, BlenderMaterialsMeanWhatBlenderMeans) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   folder.write("m.mtl",
                "# Blender 3.4.1 MTL File: 'None'\nnewmtl a\nNs 250\nKa 1 1 1\nKd 0.45 0.25 0.12\nKs 0.5 0.5 0.5\nNi "
                "1.45\nd 1\nillum 2\n");
@@ -76,7 +79,7 @@ TEST(ImportObj, BlenderMaterialsMeanWhatBlenderMeans) {
 }
 
 TEST(ImportObj, PhongAndPbrMaterialsOfOtherPrograms) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   folder.write("m.mtl",
                "newmtl phong\nKd 0.2 0.2 0.2\nKs 0.3 0.3 0.3\nNs 30\nillum 2\nnewmtl pbr\nKd 1 0 0\nPr 0.5\nPm 1\n"
                "newmtl plain\nKd 0.5 0.5 0.5\nKs 1 1 1\nillum 1\n");
@@ -96,7 +99,7 @@ TEST(ImportObj, PhongAndPbrMaterialsOfOtherPrograms) {
 }
 
 TEST(ImportObj, TexturesAreFoundAveragedAndTheRightWayUp) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   // top row red, bottom row blue; the face covers the upper half of the image: v from 0.5 to 1
   folder.write("maps/t.png", png(2, 2, {{255, 0, 0, 255}, {255, 0, 0, 255}, {0, 0, 255, 255}, {0, 0, 255, 255}}));
   folder.write("m.mtl", "newmtl a\nKd 1 1 1\nmap_Kd maps\\t.png\n");
@@ -107,7 +110,7 @@ TEST(ImportObj, TexturesAreFoundAveragedAndTheRightWayUp) {
 }
 
 TEST(ImportObj, DissolveMapCutsTheFace) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   std::vector<std::array<uint8_t, 4>> texels(64 * 64, {0, 0, 0, 255});
   for (size_t i = 0; i < 64 * 64; ++i) {
     if (i % 64 < 16) texels[i] = {255, 255, 255, 255};  // grey image: its value is the mask; opaque left quarter
@@ -128,7 +131,7 @@ TEST(ImportObj, DissolveMapCutsTheFace) {
 }
 
 TEST(ImportObj, MissingTextureIsAWarningAndThePlainColour) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   folder.write("m.mtl", "newmtl a\nKd 0.1 0.2 0.3\nmap_Kd nowhere.png\n");
   const auto asset =
       import_asset(folder.write("a.obj", std::string("mtllib m.mtl\nusemtl a\n") + kQuadObj + "f 1 2 3\n"));
@@ -139,7 +142,7 @@ TEST(ImportObj, MissingTextureIsAWarningAndThePlainColour) {
 }
 
 TEST(ImportObj, VertexColoursAreSrgbAndTintTheMaterial) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto asset =
       import_asset(folder.write("a.obj", "v 0 0 0 0.5 0 1\nv 1 0 0 0.5 0 1\nv 0 1 0 0.5 0 1\nf 1 2 3\n"));
   ASSERT_TRUE(asset) << asset.error().message;
@@ -147,7 +150,7 @@ TEST(ImportObj, VertexColoursAreSrgbAndTintTheMaterial) {
 }
 
 TEST(ImportObj, LibraryNameWithBlanksAndGzippedLibrary) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   folder.write("my maps.mtl", "newmtl a\nKd 0.1 0.1 0.1\n");
   folder.write("packed.mtl.gz", gzip("newmtl b\nKd 0.9 0.9 0.9\n"));
   const auto asset = import_asset(folder.write("a.obj.gz", gzip(std::string("mtllib my maps.mtl\nmtllib packed.mtl\n") +
@@ -159,7 +162,7 @@ TEST(ImportObj, LibraryNameWithBlanksAndGzippedLibrary) {
 }
 
 TEST(ImportObj, WithoutMaterialFacesAreBlendersGrey) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto asset = import_asset(folder.write("a.obj", std::string(kQuadObj) + "f 1 2 3\n"));
   ASSERT_TRUE(asset);
   expect_near(first_material(asset).diffuse, vec3(0.8f));
@@ -172,7 +175,7 @@ const char* const kPlyVertex = "element vertex 3\nproperty float x\nproperty flo
 const char* const kPlyFace = "element face 1\nproperty list uchar int vertex_indices\n";
 
 TEST(ImportPly, AllEncodingsGiveTheSameSurface) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const std::string head = std::string(kPlyVertex) + "property uchar red\nproperty uchar green\nproperty uchar blue\n" +
                            kPlyFace + "end_header\n";
   const auto encode = [&](bool big) {
@@ -206,7 +209,7 @@ TEST(ImportPly, AllEncodingsGiveTheSameSurface) {
 }
 
 TEST(ImportPly, FacesMayComeBeforeVerticesAndCarryColours) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto asset =
       import_asset(folder.write("a.ply", std::string("ply\nformat ascii 1.0\n") + kPlyFace +
                                              "property uchar red\nproperty uchar green\nproperty uchar blue\n" +
@@ -216,7 +219,7 @@ TEST(ImportPly, FacesMayComeBeforeVerticesAndCarryColours) {
 }
 
 TEST(ImportPly, BrokenHeadersAndIndicesAreRefusedWithAReason) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const std::string start = "ply\nformat ascii 1.0\n", body = "end_header\n0 0 0\n1 0 0\n0 1 0\n";
   const struct {
     std::string text, reason;
@@ -265,7 +268,7 @@ std::string material_file(const std::string& material, const std::string& member
 }
 
 TEST(ImportGltf, MetallicRoughnessMapsToFaceMaterial) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto asset = import_asset(folder.write(
       "m.glb",
       material_file(
@@ -278,7 +281,7 @@ TEST(ImportGltf, MetallicRoughnessMapsToFaceMaterial) {
 }
 
 TEST(ImportGltf, SpecularIorAndDiffuseTransmissionExtensions) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto asset = import_asset(folder.write(
       "m.glb", material_file(
                    R"({"pbrMetallicRoughness":{"baseColorFactor":[0.5,0.5,0.5,1],"metallicFactor":0},"extensions":{
@@ -294,7 +297,7 @@ TEST(ImportGltf, SpecularIorAndDiffuseTransmissionExtensions) {
 }
 
 TEST(ImportGltf, TextureTransformMovesTheFootprint) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const std::string image = png(2, 1, {{255, 0, 0, 255}, {0, 255, 0, 255}});
   const std::string uvs = raw<float>({0, 0, 1, 0, 0, 1});
   const auto file = [&](const std::string& transform) {
@@ -320,7 +323,7 @@ TEST(ImportGltf, TextureTransformMovesTheFootprint) {
 }
 
 TEST(ImportGltf, VertexColoursAreLinearAndMultiply) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const std::string colors = raw<uint8_t>({255, 128, 0, 255, 255, 128, 0, 255, 255, 128, 0, 255});
   const auto asset = import_asset(folder.write(
       "c.glb",
@@ -338,7 +341,7 @@ TEST(ImportGltf, QuantizedPositionsAreDecoded) {
       "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
       "accessors":[{"bufferView":0,"componentType":5122,"normalized":true,"count":3,"type":"VEC3"}],
       "bufferViews":[{"buffer":0,"byteLength":24,"byteStride":8}],"buffers":[{"byteLength":24}]})";
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto asset = import_asset(folder.write("q.glb", glb(json, shorts)));
   ASSERT_TRUE(asset) << asset.error().message;
   EXPECT_EQ(asset->surface.bounds().lower, vec3(0, -2, 0));
@@ -351,7 +354,7 @@ TEST(ImportGltf, OneMeshComesInItsOwnSpaceAllNodesInTheWorld) {
       "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
       "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],
       "bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36}]})";
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto file = folder.write("i.glb", glb(json, raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 1})));
   const auto one = import_asset(file, {0}), all = import_asset(file), none = import_asset(file, {1});
   ASSERT_TRUE(one && all);
@@ -366,7 +369,7 @@ TEST(ImportGltf, OneMeshComesInItsOwnSpaceAllNodesInTheWorld) {
 }
 
 TEST(ImportGltf, CountsWithoutBytesBehindThemAllocateNothing) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   // two sparse accessors that promise 4e9 zeros, and 1.8e19 of them
   for (const char* count : {"4000000000", "18446744073709551615"}) {
     const std::string json =
@@ -383,7 +386,7 @@ TEST(ImportGltf, CountsWithoutBytesBehindThemAllocateNothing) {
 // ---- every format
 
 TEST(Import, UnknownKindsAreRefusedByName) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   for (const char* name : {"scene.fbx", "cloud.vdb", "cloud.nvdb.gz", "noextension"}) {
     const auto asset = import_asset(folder.write(name, "whatever"));
     ASSERT_FALSE(asset);
@@ -396,7 +399,7 @@ TEST(Import, UnknownKindsAreRefusedByName) {
 }
 
 TEST(Import, SizesThatSinglePrecisionCannotHoldAreRefusedWithTheRemedy) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   for (const char* size : {"1e-30", "1e30", "1e300"}) {
     const auto asset =
         import_asset(folder.write("a.obj", fmt::format("v 0 0 0\nv {0} 0 0\nv 0 {0} 0\nf 1 2 3\n", size)));
@@ -422,7 +425,7 @@ std::vector<std::pair<std::string, std::string>> valid_files() {
 }
 
 TEST(Import, EveryTruncationLoadsOrFailsButNeverCrashes) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   for (const auto& [name, content] : valid_files()) {
     ASSERT_TRUE(import_asset(folder.write(name, content))) << name;
     for (size_t length = 0; length < content.size(); ++length)
@@ -431,7 +434,7 @@ TEST(Import, EveryTruncationLoadsOrFailsButNeverCrashes) {
 }
 
 TEST(Import, FlippedBytesLoadOrFailButNeverCrash) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   std::mt19937 rng(13);
   for (const auto& [name, content] : valid_files()) {
     for (int run = 0; run < 400; ++run) {

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "base/parallel.h"
-#include "tests/support/test_surfaces.h"
+#include "tests/support/surfaces.h"
 
 namespace farfield {
 namespace {

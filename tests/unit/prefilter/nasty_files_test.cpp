@@ -9,10 +9,13 @@
 
 #include "import/gltf_scene.h"
 #include "prefilter/condition.h"
+#include "tests/support/files.h"
 #include "tests/support/gltf_files.h"
 
 namespace farfield {
 namespace {
+
+using namespace test;
 
 namespace fs = std::filesystem;
 
@@ -28,7 +31,7 @@ std::vector<std::string> names() {
 }
 
 /// Files too large to be stored here, made as scripts/make_nasty.py of the shared assets makes them.
-fs::path find_or_make(const std::string& name, const TempFolder& folder) {
+fs::path find_or_make(const std::string& name, const TemporaryFolder& folder) {
   if (fs::exists(kNasty / name)) return kNasty / name;
   if (name == "deep_hierarchy_5000.glb") {
     std::string nodes = R"({"mesh":0,"children":[1]},)";
@@ -77,7 +80,7 @@ void expect_usable(const Surface& surface) {
 class NastyFile : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(NastyFile, LoadsOrIsRefusedAsExpected) {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const std::string name = GetParam();
   const std::string load = expectations()[name]["load"];
   const fs::path file = find_or_make(name, folder);

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "prefilter/voxelize.h"
-#include "tests/support/leaf_cloud.h"
+#include "tests/support/surfaces.h"
 
 namespace farfield {
 namespace {

@@ -15,7 +15,7 @@
 #include "prefilter/edge_table.h"
 #include "prefilter/material_filter.h"
 #include "prefilter/vertex_placement.h"
-#include "tests/support/test_surfaces.h"
+#include "tests/support/surfaces.h"
 
 namespace farfield {
 namespace {

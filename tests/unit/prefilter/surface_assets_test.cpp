@@ -10,7 +10,7 @@
 #include "prefilter/condition.h"
 #include "prefilter/macrosurface.h"
 #include "prefilter/simplify.h"
-#include "tests/support/test_surfaces.h"
+#include "tests/support/surfaces.h"
 
 namespace farfield {
 namespace {

@@ -9,14 +9,16 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "prefilter/density.h"
-#include "tests/support/leaf_cloud.h"
+#include "tests/support/random_unit.h"
+#include "tests/support/ray_scenes.h"
+#include "tests/support/surfaces.h"
 
 namespace farfield {
 namespace {
 
 using test::leaf_cloud;
 using test::LeafCloud;
-using test::random_direction;
+using test::random_unit;
 using test::total_area;
 
 VoxelLattice lattice_of(double voxel_size) { return {dvec3(0), voxel_size}; }
@@ -118,7 +120,7 @@ TEST(Voxelize, LetsAsMuchLightThroughAsTheLeavesDo) {
       const test::MeshScene mesh(leaves);
       test::VolumeScene scene(volume);
       for (int i = 0; i < kRays; ++i) {
-        const vec3 direction = random_direction(rng);
+        const vec3 direction = random_unit(rng);
         const vec3 target(rng.next(), rng.next(), rng.next());
         through_mesh += mesh.is_hit(target - 3.0f * direction, direction) ? 0 : 1;
         through_volume += scene.transmittance(target - 3.0f * direction, direction);

@@ -12,14 +12,15 @@
 
 #include "base/bytes.h"
 #include "base/parallel.h"
-#include "tests/support/test_asset.h"
-#include "tests/support/test_levels.h"
+#include "tests/support/files.h"
+#include "tests/support/level_builder.h"
+#include "tests/support/runtime_host.h"
 
 namespace farfield {
 namespace {
 
-using testing::Host;
-using testing::TemporaryFolder;
+using test::Host;
+using test::TemporaryFolder;
 
 uint64_t status_bytes(const std::string& field) {
   std::ifstream status("/proc/self/status");
@@ -53,16 +54,16 @@ void in_a_child_process(const Work& work) {
 std::vector<LevelData> foliage(uint32_t leaves, uint64_t seed) {
   std::vector<LevelData> levels;
   for (uint32_t k = 0; k < 5; ++k) {
-    LevelData level = testing::triangle_soup(leaves >> (2 * k), 0.02f * static_cast<float>(1u << k), seed + k);
+    LevelData level = test::triangle_soup(leaves >> (2 * k), 0.02f * static_cast<float>(1u << k), seed + k);
     level.header.level = k;
     level.header.resolution = 0.005f * static_cast<float>(1u << k);
     if (k > 0) level.morph_vertex.assign(levels.back().positions.size(), 0);
     if (k > 1) {
       const int bricks = 64 >> k;
-      testing::set_volume(level, ivec3(bricks / 2), vec3(-0.3f),
-                          [&](int x, int y, int z) { return (x * 7 + y * 3 + z) % 3 == 0 ? 2.0f : 0.0f; });
+      test::set_volume(level, ivec3(bricks / 2), vec3(-0.3f),
+                       [&](int x, int y, int z) { return (x * 7 + y * 3 + z) % 3 == 0 ? 2.0f : 0.0f; });
     }
-    testing::set_diffuse(level, vec3(0.5f));
+    test::set_diffuse(level, vec3(0.5f));
     levels.push_back(std::move(level));
   }
   return levels;
@@ -110,9 +111,9 @@ TEST(Memory, TheProcessGrowsByNoMoreThanTheBudgetAndFivePercent) {
   const TemporaryFolder folder;
   in_a_child_process([&] {
     for (int i = 0; i < 3; ++i) {
-      testing::write_asset(folder.path() / std::to_string(i), foliage(60000, static_cast<uint64_t>(10 * i)));
+      test::write_asset(folder.path() / std::to_string(i), foliage(60000, static_cast<uint64_t>(10 * i)));
     }
-    testing::write_asset(folder.path() / "warm_up", foliage(3000, 99));
+    test::write_asset(folder.path() / "warm_up", foliage(3000, 99));
   });
   {  // code, stacks and thread-local memory are not the assets': touch them before the measurement
     Host host;

@@ -12,18 +12,20 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 #include "cache/manifest.h"
-#include "tests/support/test_asset.h"
-#include "tests/support/test_levels.h"
+#include "tests/support/files.h"
+#include "tests/support/level_builder.h"
+#include "tests/support/random_unit.h"
+#include "tests/support/runtime_host.h"
 
 namespace farfield {
 namespace {
 
-using testing::hash_of_hits;
-using testing::Host;
-using testing::set_diffuse;
-using testing::TemporaryFolder;
-using testing::white_sphere;
-using testing::write_asset;
+using test::hash_of_hits;
+using test::Host;
+using test::set_diffuse;
+using test::TemporaryFolder;
+using test::white_sphere;
+using test::write_asset;
 
 /// The white sphere on disk, once for all tests.
 class RuntimeTest : public ::testing::Test {
@@ -546,12 +548,12 @@ TEST_F(RuntimeTest, JustBelowAndAboveAnIntegerLambdaRaysSeeTheSame) {
     std::vector<float> seen;
     for (uint32_t i = 0; i < 20000; ++i) {
       Rng rng(i);
-      const vec3 direction = testing::random_unit(rng);
+      const vec3 direction = test::random_unit(rng);
       RayContext context;
       context.path_seed = rng.next_uint();
       context.ray_seed = rng.next_uint();
       RTCRayHit hit;
-      const bool is_hit = host.trace(0.9f * testing::random_unit(rng) - 5.0f * direction, direction, context, hit);
+      const bool is_hit = host.trace(0.9f * test::random_unit(rng) - 5.0f * direction, direction, context, hit);
       seen.push_back(is_hit ? hit.ray.tfar + static_cast<float>(context.hit.level_slot) : -1.0f);
     }
     return seen;
@@ -649,7 +651,7 @@ TEST_F(RuntimeTest, SurfacesAndBlocksOfAlbedoOneAreWhiteFurnaces) {
     Host host(with_lambda(lambda));
     mat4x3 transform;
     for (int column = 0; column < 3; ++column)
-      transform[column] = (0.5f + transforms.next()) * testing::random_unit(transforms);
+      transform[column] = (0.5f + transforms.next()) * test::random_unit(transforms);
     transform[3] = vec3(3, -2, 1);
     host.add(sphere(), {transform});
     host.plan();
@@ -658,8 +660,8 @@ TEST_F(RuntimeTest, SurfacesAndBlocksOfAlbedoOneAreWhiteFurnaces) {
     constexpr int kPaths = 4000;
     for (uint32_t path = 0; path < kPaths; ++path) {
       Rng rng(path, 3);
-      vec3 direction = testing::random_unit(rng);
-      vec3 origin = vec3(3, -2, 1) + 0.3f * testing::random_unit(rng) - 8.0f * direction;
+      vec3 direction = test::random_unit(rng);
+      vec3 origin = vec3(3, -2, 1) + 0.3f * test::random_unit(rng) - 8.0f * direction;
       vec3 throughput(1.0f);
       RayContext context;
       context.path_seed = path;
@@ -698,27 +700,27 @@ TEST_F(RuntimeTest, RaysThatLeaveASurfaceDoNotMeetItAgain) {
     const float size = std::pow(10.0f, 6.0f * rng.next() - 3.0f);
     do {
       for (int column = 0; column < 3; ++column)
-        transform[column] = size * (0.3f + rng.next()) * testing::random_unit(rng);
+        transform[column] = size * (0.3f + rng.next()) * test::random_unit(rng);
     } while (std::abs(glm::determinant(mat3(transform))) < 0.05f * size * size * size);
     // Up to 1e3 sizes away from the origin of the world; in the last cases 1e7 units.
     const float far = i < 25 ? 1e3f * size * rng.next() : 1e7f;
     if (i >= 25) {
       for (int column = 0; column < 3; ++column) transform[column] *= 1e5f / size;
     }
-    transform[3] = far * testing::random_unit(rng);
+    transform[3] = far * test::random_unit(rng);
     const float radius = i < 25 ? size : 1e5f;
     host.add(sphere(), {transform});
     host.plan();
     int self_hits = 0, rays = 0;
     for (int k = 0; k < 500; ++k) {
-      const vec3 direction = testing::random_unit(rng);
+      const vec3 direction = test::random_unit(rng);
       RayContext context;
       RTCRayHit hit;
       if (!host.trace(transform[3] - 4.0f * radius * direction, direction, context, hit)) continue;
       const Interaction interaction = host.interaction(hit, context);
       ASSERT_TRUE(is_finite(interaction.position) && is_finite(interaction.geometric_normal));
       for (int out = 0; out < 4; ++out) {
-        vec3 wi = testing::random_unit(rng);
+        vec3 wi = test::random_unit(rng);
         if (glm::dot(wi, interaction.geometric_normal) < 0.0f) wi = -wi;
         RayContext next;
         next.set_origin(context.hit);

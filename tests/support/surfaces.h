@@ -7,6 +7,7 @@
 
 #include "base/vec.h"
 #include "prefilter/surface.h"
+#include "tests/support/random_unit.h"
 
 namespace farfield::test {
 
@@ -80,6 +81,35 @@ inline Surface make_sphere(int around, int rings, float radius) {
     surface.triangles.emplace_back(vertex(i, rings - 1), south, vertex(i + 1, rings - 1));
   }
   add_materials(surface);
+  return surface;
+}
+
+/// Square leaves of two triangles, spread evenly over the unit cube.
+struct LeafCloud {
+  int count = 4000;
+  float leaf_size = 0.02f;  ///< side of a square
+  float flatness = 0;       ///< 0: any normal; 1: all normals along z
+  uint64_t seed = 7;
+};
+
+inline Surface leaf_cloud(const LeafCloud& cloud) {
+  Rng rng(cloud.seed);
+  Surface surface;
+  for (int i = 0; i < cloud.count; ++i) {
+    const vec3 normal = glm::normalize(random_unit(rng) * (1 - cloud.flatness) + vec3(0, 0, 1) * cloud.flatness);
+    const Frame frame(normal);
+    const vec3 middle(rng.next(), rng.next(), rng.next());
+    const auto first = static_cast<uint32_t>(surface.positions.size());
+    for (const vec2 corner : {vec2(-1, -1), vec2(1, -1), vec2(1, 1), vec2(-1, 1)}) {
+      surface.positions.push_back(middle + 0.5f * cloud.leaf_size * (corner.x * frame.x + corner.y * frame.y));
+    }
+    surface.triangles.push_back({first, first + 1, first + 2});
+    surface.triangles.push_back({first, first + 2, first + 3});
+    FaceMaterial material;
+    material.sggx = SymMat3::outer(normal);
+    material.diffuse = vec3(rng.next(), 0.5f, 0.25f);
+    surface.materials.insert(surface.materials.end(), 2, material);
+  }
   return surface;
 }
 

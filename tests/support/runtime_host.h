@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small baked assets on disk, made without the bake, and a host around a Runtime.
+// A host around a Runtime, and assets whose sizes are right for it.
 #pragma once
 
 #include <embree3/rtcore.h>
@@ -12,28 +12,10 @@
 #include "cache/level.h"
 #include "farfield/runtime.h"
 
-namespace farfield::testing {
-
-/// A folder that is there during a test.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
+namespace farfield::test {
 
 /// Writes an asset of these levels, finest first, measured as the bake would. Stops the test program if it cannot.
 void write_asset(const std::filesystem::path& folder, const std::vector<LevelData>& levels, dvec3 origin = dvec3(0.0));
-
-/// A white sphere of radius 1 around the origin: level 0 and 1 meshes, level 2 a mesh in thin haze, level 3 and 5
-/// (there is no 4) dense voxels. `rings` sets the size of level 0.
-std::vector<LevelData> white_sphere(uint32_t rings = 64);
-
-/// Gives every face and voxel of a level this diffuse albedo.
-void set_diffuse(LevelData& level, const vec3& albedo);
 
 /// An Embree device and scene around a runtime, as a host has them.
 class Host {
@@ -64,4 +46,4 @@ class Host {
 /// A hash of what 20000 fixed rays see around the unit sphere's place: instance, element, level, t; on all threads.
 uint64_t hash_of_hits(const Host& host, float spread = 0.0f);
 
-}  // namespace farfield::testing
+}  // namespace farfield::test

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Geometry made on the spot, and two ways to see through it: its triangles and a volume of it.
+// Two ways to see through geometry: its triangles and a volume of it.
 #pragma once
 
 #include <embree3/rtcore.h>
@@ -9,46 +9,10 @@
 #include <limits>
 #include <vector>
 
-#include "base/random.h"
 #include "prefilter/surface.h"
 #include "prefilter/voxelize.h"
-#include "tests/support/test_surfaces.h"
 
 namespace farfield::test {
-
-inline vec3 random_direction(Rng& rng) {
-  const float z = 2 * rng.next() - 1, angle = 2 * kPi * rng.next(), r = std::sqrt(std::max(0.0f, 1 - z * z));
-  return {r * std::cos(angle), r * std::sin(angle), z};
-}
-
-/// Square leaves of two triangles, spread evenly over the unit cube.
-struct LeafCloud {
-  int count = 4000;
-  float leaf_size = 0.02f;  ///< side of a square
-  float flatness = 0;       ///< 0: any normal; 1: all normals along z
-  uint64_t seed = 7;
-};
-
-inline Surface leaf_cloud(const LeafCloud& cloud) {
-  Rng rng(cloud.seed);
-  Surface surface;
-  for (int i = 0; i < cloud.count; ++i) {
-    const vec3 normal = glm::normalize(random_direction(rng) * (1 - cloud.flatness) + vec3(0, 0, 1) * cloud.flatness);
-    const Frame frame(normal);
-    const vec3 middle(rng.next(), rng.next(), rng.next());
-    const auto first = static_cast<uint32_t>(surface.positions.size());
-    for (const vec2 corner : {vec2(-1, -1), vec2(1, -1), vec2(1, 1), vec2(-1, 1)}) {
-      surface.positions.push_back(middle + 0.5f * cloud.leaf_size * (corner.x * frame.x + corner.y * frame.y));
-    }
-    surface.triangles.push_back({first, first + 1, first + 2});
-    surface.triangles.push_back({first, first + 2, first + 3});
-    FaceMaterial material;
-    material.sggx = SymMat3::outer(normal);
-    material.diffuse = vec3(rng.next(), 0.5f, 0.25f);
-    surface.materials.insert(surface.materials.end(), 2, material);
-  }
-  return surface;
-}
 
 /// The triangles, to cast long rays at.
 class MeshScene {

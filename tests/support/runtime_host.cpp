@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/support/runtime_host.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "base/check.h"
+#include "base/hash.h"
+#include "base/parallel.h"
+#include "bvh/level_scene.h"
+#include "tests/support/asset_writer.h"
+#include "tests/support/random_unit.h"
+
+namespace farfield::test {
+
+void write_asset(const std::filesystem::path& folder, const std::vector<LevelData>& levels, dvec3 origin) {
+  const auto measure = [](const LevelView& level) {
+    const auto cost = measure_level_scene(level);
+    if (!cost) ADD_FAILURE() << cost.error().message;
+    FARFIELD_CHECK(cost.has_value());
+    return *cost;
+  };
+  write_asset(folder, levels, measure, origin);
+}
+
+Host::Host(RuntimeOptions options) : device_(rtcNewDevice("")) {
+  options.messages = [this](Severity, const std::string& message) { messages.push_back(message); };
+  auto runtime = Runtime::create(device_, options);
+  if (!runtime) ADD_FAILURE() << runtime.error().message;
+  FARFIELD_CHECK(runtime.has_value());
+  runtime_ = std::move(*runtime);
+}
+
+Host::~Host() {
+  if (scene_) rtcReleaseScene(scene_);
+  runtime_.reset();
+  rtcReleaseDevice(device_);
+}
+
+AssetId Host::add(const std::filesystem::path& folder, const std::vector<mat4x3>& transforms) {
+  const auto asset = runtime_->open_asset(folder.string());
+  if (!asset) ADD_FAILURE() << asset.error().message;
+  FARFIELD_CHECK(asset.has_value());
+  for (const mat4x3& transform : transforms) {
+    const auto instance = runtime_->add_instance(*asset, transform);
+    if (!instance) ADD_FAILURE() << instance.error().message;
+  }
+  return *asset;
+}
+
+PlanSummary Host::plan(const vec3& position, float pixel_spread) {
+  runtime_->set_cameras({{position, 0.0f, pixel_spread}});
+  const auto plan = runtime_->plan_frame();
+  if (!plan) ADD_FAILURE() << plan.error().message;
+  FARFIELD_CHECK(plan.has_value());
+  commit();
+  return *plan;
+}
+
+void Host::commit() {
+  if (!scene_) scene_ = rtcNewScene(device_);
+  const auto attached = runtime_->attach(scene_);
+  if (!attached) ADD_FAILURE() << attached.error().message;
+  rtcCommitScene(scene_);
+}
+
+bool Host::trace(const vec3& origin, const vec3& direction, RayContext& context, RTCRayHit& ray_hit) const {
+  ray_hit = {};
+  ray_hit.ray.org_x = origin.x, ray_hit.ray.org_y = origin.y, ray_hit.ray.org_z = origin.z;
+  ray_hit.ray.dir_x = direction.x, ray_hit.ray.dir_y = direction.y, ray_hit.ray.dir_z = direction.z;
+  ray_hit.ray.tfar = std::numeric_limits<float>::infinity();
+  ray_hit.ray.mask = 0xffffffffu;
+  ray_hit.hit.geomID = ray_hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(scene_, &context.embree, &ray_hit);
+  return ray_hit.hit.geomID == runtime_->geometry_id();
+}
+
+uint64_t hash_of_hits(const Host& host, float spread) {
+  constexpr size_t kRays = 20000;
+  std::vector<uint64_t> hashes(kRays);
+  parallel_for(kRays, 128, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      Rng rng(i);
+      const vec3 direction = random_unit(rng);
+      RayContext context;
+      context.path_seed = rng.next_uint();
+      context.ray_seed = rng.next_uint();
+      context.cone_spread = spread * rng.next();
+      RTCRayHit hit;
+      if (!host.trace(1.2f * random_unit(rng) - 10.0f * direction, direction, context, hit)) continue;
+      uint32_t t_bits;
+      std::memcpy(&t_bits, &hit.ray.tfar, sizeof t_bits);
+      hashes[i] = mix64(mix64(context.hit.instance, context.hit.element), mix64(context.hit.level_slot, t_bits));
+    }
+  });
+  return hash_values(std::span<const uint64_t>(hashes));
+}
+
+}  // namespace farfield::test
