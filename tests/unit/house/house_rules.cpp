@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <regex>
 #include <sstream>
 
@@ -30,11 +31,14 @@ Lines quoted_words(const std::string& text) {
   return words;
 }
 
-/// The room of an included path: "farfield/ray.h" lies in include/, "macros.h" beside its includer; none for others.
-std::string room_of_include(const std::string& path, const std::string& own_room) {
-  const size_t slash = path.find('/');
-  if (slash == std::string::npos) return own_room;
-  const std::string folder = path.substr(0, slash);
+/// The room of what `file` includes: "farfield/ray.h" lies in include/, "../common/host.h" and "macros.h" are relative
+/// to the includer.
+std::string room_of_include(const std::string& path, const std::string& file) {
+  const std::filesystem::path own_folder = std::filesystem::path(file).parent_path();
+  const bool is_relative = path.starts_with("..") || path.find('/') == std::string::npos;
+  const std::string from_root =
+      (is_relative ? own_folder / path : std::filesystem::path(path)).lexically_normal().string();
+  const std::string folder = from_root.substr(0, from_root.find('/'));
   return folder == "farfield" ? "include" : folder;
 }
 
@@ -119,7 +123,7 @@ std::vector<std::string> find_forbidden_includes(const SourceFile& file, const A
     std::smatch match;
     if (!std::regex_match(lines[i], match, include)) continue;
     const std::string path = match[1].matched ? match[1] : match[2];
-    const std::string room = room_of_include(path, own_room);
+    const std::string room = room_of_include(path, file.name);
     if (room == own_room || allowed->second.contains(room)) continue;
     problems.push_back(fmt::format("{}:{}: {} may not include {} (\"{}\")", file.name, i + 1, own_room, room, path));
   }

@@ -133,6 +133,9 @@ TEST(HouseRules, FindAnIncludeAgainstTheArrows) {
                       "walls/brick.cpp:3: walls may not include cellar (\"cellar/wine.h\")"}));
   EXPECT_EQ(find_forbidden_includes({"roof/tile.h", "#include <farfield/ray.h>"}, arrows),
             (Problems{"roof/tile.h:1: roof may not include include (\"farfield/ray.h\")"}));
+  EXPECT_EQ(find_forbidden_includes({"roof/slate/tile.h", "#include \"../nail.h\"\n#include \"grain.h\""}, arrows),
+            Problems{});
+  EXPECT_EQ(find_forbidden_includes({"roof/tile.h", "#include \"../attic/box.h\""}, arrows).size(), 1u);
   EXPECT_EQ(find_forbidden_includes({"shed/rake.h", ""}, arrows).size(), 1u);
 }
 
