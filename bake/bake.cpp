@@ -21,6 +21,7 @@
 #include "bake/slab_hull.h"
 #include "base/file_io.h"
 #include "base/hash.h"
+#include "base/index.h"
 #include "base/result.h"
 #include "bvh/level_scene.h"
 #include "cache/level_file.h"
@@ -121,7 +122,7 @@ SplitSurface split(const Surface& surface, const std::vector<uint8_t>& is_macros
   SplitSurface result;
   result.macrosurface.positions = surface.positions;
   result.macrosurface.origin = surface.origin;
-  std::vector<uint32_t> moved(surface.positions.size(), kUnused);
+  std::vector<uint32_t> moved(surface.positions.size(), kNoIndex);
   for (size_t f = 0; f < surface.triangles.size(); ++f) {
     if (is_macrosurface[f]) {
       result.macro_face.push_back(static_cast<uint32_t>(result.macrosurface.triangles.size()));
@@ -133,7 +134,7 @@ SplitSurface split(const Surface& surface, const std::vector<uint8_t>& is_macros
     uvec3 triangle = surface.triangles[f];
     for (int c = 0; c < 3; ++c) {
       uint32_t& vertex = moved[triangle[c]];
-      if (vertex == kUnused) {
+      if (vertex == kNoIndex) {
         vertex = static_cast<uint32_t>(sub_resolution.positions.size());
         sub_resolution.positions.push_back(surface.positions[triangle[c]]);
       }

@@ -16,6 +16,7 @@
 #include <map>
 #include <numeric>
 
+#include "base/index.h"
 #include "prefilter/ear_clipping.h"
 
 namespace farfield {
@@ -92,7 +93,7 @@ using Loop = std::vector<LoopPoint>;
 class Outline {
  public:
   explicit Outline(const Lattice& lattice) : lattice_(lattice), n_(lattice.size()) {
-    next_.assign(3 * static_cast<size_t>(n_ + 1) * static_cast<size_t>(n_ + 1), kNone);
+    next_.assign(3 * static_cast<size_t>(n_ + 1) * static_cast<size_t>(n_ + 1), kNoIndex);
     for (int j = 0; j < n_; ++j) {
       for (int i = 0; i + j < n_; ++i) {
         march({{{i, j}, {i + 1, j}, {i, j + 1}}});
@@ -106,13 +107,13 @@ class Outline {
   std::vector<Loop> loops() {
     std::vector<Loop> out;
     for (uint32_t start = 0; start < next_.size(); ++start) {
-      if (next_[start] == kNone) continue;
+      if (next_[start] == kNoIndex) continue;
       Loop loop;
       uint32_t at = start;
-      while (next_[at] != kNone) {
+      while (next_[at] != kNoIndex) {
         loop.push_back({position(at), is_on_border(at)});
         const uint32_t following = next_[at];
-        next_[at] = kNone;
+        next_[at] = kNoIndex;
         at = following;
         if (const auto inner = border_.find(at); inner != border_.end()) {
           loop.push_back({position(at), true});
@@ -129,7 +130,6 @@ class Outline {
   }
 
  private:
-  static constexpr uint32_t kNone = UINT32_MAX;
   using Node = std::array<int, 2>;
 
   /// From where the outline comes in on the border, along the border to where it leaves it.
@@ -196,7 +196,7 @@ class Outline {
     size_t start = 0;
     while (start < count && is_inside(nodes[start])) ++start;
     if (start == count) return;  // all inside: no crossings
-    uint32_t enter = kNone;
+    uint32_t enter = kNoIndex;
     std::vector<dvec2> corners;
     for (size_t k = 0; k < count; ++k) {
       const Node &a = nodes[(start + k) % count], &b = nodes[(start + k + 1) % count];
@@ -367,15 +367,15 @@ void flip_to_delaunay(Filling& filling, const TexelMetric& metric) {
     const uvec3& t = filling.triangles[triangle];
     for (int k = 0; k < 3; ++k) {
       auto& sides =
-          faces.try_emplace(name(t[k], t[(k + 1) % 3]), std::array<uint32_t, 2>{UINT32_MAX, UINT32_MAX}).first->second;
-      (sides[0] == UINT32_MAX ? sides[0] : sides[1]) = triangle;
+          faces.try_emplace(name(t[k], t[(k + 1) % 3]), std::array<uint32_t, 2>{kNoIndex, kNoIndex}).first->second;
+      (sides[0] == kNoIndex ? sides[0] : sides[1]) = triangle;
     }
   };
   for (uint32_t i = 0; i < filling.triangles.size(); ++i) link(i);
 
   std::vector<Edge> stack;
   for (const auto& [edge, sides] : faces) {
-    if (sides[1] != UINT32_MAX) stack.push_back(edge);
+    if (sides[1] != kNoIndex) stack.push_back(edge);
   }
   const auto replace_side = [&](Edge edge, uint32_t from, uint32_t to) {
     for (uint32_t& side : faces[edge]) {
@@ -391,7 +391,7 @@ void flip_to_delaunay(Filling& filling, const TexelMetric& metric) {
     const Edge edge = stack.back();
     stack.pop_back();
     const auto found = faces.find(edge);
-    if (found == faces.end() || found->second[1] == UINT32_MAX) continue;
+    if (found == faces.end() || found->second[1] == kNoIndex) continue;
     const uint32_t left = found->second[0], right = found->second[1];
     uvec3 &l = filling.triangles[left], &r = filling.triangles[right];
     int k = 0;

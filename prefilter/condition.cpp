@@ -10,6 +10,7 @@
 #include <unordered_set>
 
 #include "base/hash.h"
+#include "base/index.h"
 #include "base/parallel.h"
 #include "base/result.h"
 #include "prefilter/alpha_cut.h"
@@ -20,8 +21,6 @@ namespace farfield {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr uint32_t kNone = UINT32_MAX;
 constexpr size_t kMaxWarnings = 50;
 
 // Longest sides that the bake's single precision can work in: areas and their squares stay normal numbers down to faces
@@ -175,11 +174,11 @@ class SurfaceBuilder {
     std::vector<FaceMaterial> materials(triangles.size());
     parallel_for(triangles.size(), 1024, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
-        if (pattern_of_[i] == kNone) materials[i] = plain_material(triangles[i]);
+        if (pattern_of_[i] == kNoIndex) materials[i] = plain_material(triangles[i]);
       }
     });
     for (size_t i = 0; i < triangles.size(); ++i) {
-      if (pattern_of_[i] == kNone) {
+      if (pattern_of_[i] == kNoIndex) {
         surface_.triangles.push_back(triangles[i].vertex);
         surface_.materials.push_back(materials[i]);
       } else {
@@ -222,7 +221,7 @@ class SurfaceBuilder {
 
   /// Gives each masked triangle its pattern, and cuts all patterns.
   void find_patterns(const std::vector<CornerTriangle>& triangles) {
-    pattern_of_.assign(triangles.size(), kNone);
+    pattern_of_.assign(triangles.size(), kNoIndex);
     std::unordered_map<uint64_t, std::vector<uint32_t>> by_hash;
     std::vector<std::vector<MaskedTriangle>> of_material(mesh_.materials.size());
     for (size_t i = 0; i < triangles.size(); ++i) {
@@ -316,11 +315,11 @@ class SurfaceBuilder {
   }
 
   void drop_unused_vertices() {
-    std::vector<uint32_t> target(surface_.positions.size(), kNone);
+    std::vector<uint32_t> target(surface_.positions.size(), kNoIndex);
     std::vector<vec3> kept;
     for (uvec3& t : surface_.triangles) {
       for (int k = 0; k < 3; ++k) {
-        if (target[t[k]] == kNone) {
+        if (target[t[k]] == kNoIndex) {
           target[t[k]] = static_cast<uint32_t>(kept.size());
           kept.push_back(surface_.positions[t[k]]);
         }
@@ -332,7 +331,7 @@ class SurfaceBuilder {
 
   const SourceMesh& mesh_;
   Surface surface_;
-  std::vector<uint32_t> pattern_of_;  ///< per triangle; kNone: not masked
+  std::vector<uint32_t> pattern_of_;  ///< per triangle; kNoIndex: not masked
   std::vector<Pattern> patterns_;
   std::unordered_map<uvec3, uint32_t, TriangleKeyHash> on_edge_;
 };
