@@ -59,9 +59,10 @@ Result<void> check_options(const BakeOptions& options) {
 
 /// Equal text and source hash give equal bytes.
 std::string canonical_options(const BakeOptions& options) {
-  if (options.source_only) return fmt::format("source_only=1 mesh={}", options.import.mesh);
-  return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} mesh={} voxelize={}", options.finest_grid,
-                     options.coarsest_grid, options.rays_per_voxel, options.import.mesh, kVoxelizeVersion);
+  const std::string import = fmt::format("mesh={} condition={}", options.import.mesh, kConditionVersion);
+  if (options.source_only) return "source_only=1 " + import;
+  return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} {} voxelize={}", options.finest_grid,
+                     options.coarsest_grid, options.rays_per_voxel, import, kVoxelizeVersion);
 }
 
 /// What a bake of `source` with these options writes into its manifest, but for the levels.
@@ -401,7 +402,7 @@ Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeO
   }
   FARFIELD_TRY(check_replaceable(out));  // before the import, which may take minutes
   options.job.report(0, "import");
-  FARFIELD_TRY_LET(auto asset, import_asset(source, options.import));
+  FARFIELD_TRY_LET(auto asset, import_asset(source, options.import, options.job));
   asset.warnings = without_folder(std::move(asset.warnings), source.parent_path());
   const double import_seconds = watch.seconds();
   FARFIELD_TRY_LET(auto report, bake(std::move(asset), source.filename().string(), out, options));

@@ -6,7 +6,7 @@
 //   |  \               inside on their left; they chain into closed loops, along the triangle's border where the
 //   |####\             inside touches it (counter-clockwise loops are outlines, clockwise ones holes)
 //   |#####>\           3. straighten the loops [Douglas and Peucker 1973]; crossings on the border stay where they are
-//   A--##----B         4. join holes, clip ears, flip edges to Delaunay
+//   A--##----B         4. fill them by a sweep line, flip edges to Delaunay
 //
 // All loops live in lattice coordinates (s, t): the point A + s (B - A) + t (C - A).
 #include "prefilter/alpha_cut.h"
@@ -17,7 +17,7 @@
 #include <numeric>
 
 #include "base/index.h"
-#include "prefilter/ear_clipping.h"
+#include "prefilter/fill_rings.h"
 
 namespace farfield {
 namespace {
@@ -302,58 +302,26 @@ double twice_area(const std::vector<Loop>& loops) {
   return sum;
 }
 
-bool is_inside(const Loop& loop, const dvec2& p) {
-  bool inside = false;
-  for (size_t k = 0; k < loop.size(); ++k) {
-    const dvec2 &a = loop[k].at, &b = loop[(k + 1) % loop.size()].at;
-    if ((a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)) inside = !inside;
-  }
-  return inside;
-}
-
-/// A filled set of loops.
-struct Filling {
-  std::vector<dvec2> points;
-  std::vector<uvec3> triangles;
-};
-
 double twice_area(const Filling& filling, const uvec3& t) {
   const dvec2 &a = filling.points[t.x], &b = filling.points[t.y], &c = filling.points[t.z];
   return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
 Filling fill(const std::vector<Loop>& loops) {
-  Filling out;
+  std::vector<dvec2> points;
   std::vector<Ring> rings;
   for (const Loop& loop : loops) {
     Ring ring(loop.size());
-    std::iota(ring.begin(), ring.end(), static_cast<uint32_t>(out.points.size()));
-    for (const LoopPoint& p : loop) out.points.push_back(p.at);
+    std::iota(ring.begin(), ring.end(), static_cast<Index>(points.size()));
+    for (const LoopPoint& p : loop) points.push_back(p.at);
     rings.push_back(std::move(ring));
   }
-  // Each hole belongs to the smallest outline around it.
-  std::vector<std::vector<Ring>> holes(loops.size());
-  for (size_t h = 0; h < loops.size(); ++h) {
-    if (loops[h].size() < 3 || twice_area(loops[h]) >= 0) continue;
-    size_t owner = loops.size();
-    for (size_t o = 0; o < loops.size(); ++o) {
-      const double area = twice_area(loops[o]);
-      if (area <= 0 || !is_inside(loops[o], loops[h][0].at)) continue;
-      if (owner == loops.size() || area < twice_area(loops[owner])) owner = o;
-    }
-    if (owner < loops.size()) holes[owner].push_back(rings[h]);
-  }
-  for (size_t o = 0; o < loops.size(); ++o) {
-    if (loops[o].size() < 3 || twice_area(loops[o]) <= 0) continue;
-    const auto triangles = clip_ears(out.points, join_holes(out.points, rings[o], holes[o]));
-    out.triangles.insert(out.triangles.end(), triangles.begin(), triangles.end());
-  }
+  Filling out = fill_rings(std::move(points), rings, Winding::Positive);
   std::erase_if(out.triangles, [&](const uvec3& t) { return twice_area(out, t) == 0; });
   return out;
 }
 
-/// Flips inner edges until every one is locally Delaunay in texel space [Lawson 1977]: ear clipping alone leaves
-/// needles.
+/// Flips inner edges until every one is locally Delaunay in texel space [Lawson 1977]: a sweep line leaves needles.
 void flip_to_delaunay(Filling& filling, const TexelMetric& metric) {
   using Edge = std::pair<uint32_t, uint32_t>;
   const auto position = [&](uint32_t v) { return metric(filling.points[v]); };

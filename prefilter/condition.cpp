@@ -165,7 +165,7 @@ std::vector<CornerTriangle> triangulate(SourceMesh& mesh, const WeldResult& weld
 /// Turns triangles with corner attributes into a surface with a material per face.
 class SurfaceBuilder {
  public:
-  SurfaceBuilder(const SourceMesh& mesh, std::vector<vec3> positions) : mesh_(mesh) {
+  SurfaceBuilder(const SourceMesh& mesh, std::vector<vec3> positions, const Job& job) : mesh_(mesh), job_(job) {
     surface_.positions = std::move(positions);
   }
 
@@ -251,7 +251,8 @@ class SurfaceBuilder {
       subdivisions.push_back(cut_subdivisions(mesh_.materials[m], of_material[m]));
     }
     parallel_for(patterns_.size(), 1, [&](size_t begin, size_t end) {
-      for (size_t p = begin; p < end; ++p) fill_pattern(patterns_[p], subdivisions[patterns_[p].material]);
+      for (size_t p = begin; p < end && !job_.is_cancelled(); ++p)
+        fill_pattern(patterns_[p], subdivisions[patterns_[p].material]);
     });
   }
 
@@ -330,6 +331,7 @@ class SurfaceBuilder {
   }
 
   const SourceMesh& mesh_;
+  const Job& job_;
   Surface surface_;
   std::vector<uint32_t> pattern_of_;  ///< per triangle; kNoIndex: not masked
   std::vector<Pattern> patterns_;
@@ -347,7 +349,7 @@ std::vector<std::string> limit(std::vector<std::string> warnings) {
 
 }  // namespace
 
-Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name) {
+Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name, const Job& job) {
   drop_faces_that_are_not_finite(mesh);
   FARFIELD_TRY_LET(const auto origin, choose_origin(mesh, name));
   std::vector<vec3> positions;
@@ -362,7 +364,8 @@ Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name) {
   const std::vector<CornerTriangle> triangles = triangulate(mesh, welded);
 
   ImportedAsset asset;
-  asset.surface = SurfaceBuilder(mesh, std::move(welded.positions)).build(triangles);
+  asset.surface = SurfaceBuilder(mesh, std::move(welded.positions), job).build(triangles);
+  if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, fmt::format("{}: cancelled", name));
   asset.surface.origin = origin;
   if (asset.surface.triangles.empty()) {
     return make_error(ErrorCode::BadFile, fmt::format("{}: no face has any area", name));
@@ -373,9 +376,9 @@ Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name) {
   return asset;
 }
 
-Result<ImportedAsset> import_asset(const fs::path& path, const ImportOptions& options) {
+Result<ImportedAsset> import_asset(const fs::path& path, const ImportOptions& options, const Job& job) {
   FARFIELD_TRY_LET(auto mesh, read_source(path, options));
-  return condition(std::move(mesh), path.string());
+  return condition(std::move(mesh), path.string(), job);
 }
 
 }  // namespace farfield
