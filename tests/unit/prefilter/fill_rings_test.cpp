@@ -6,10 +6,14 @@
 #include <random>
 #include <set>
 
+#include "tests/support/polygons.h"
+
 namespace farfield {
 namespace {
 
 using glm::dvec2;
+using test::random_star;
+using test::ring_of;
 
 double area(const Filling& filling) {
   double sum = 0;
@@ -19,23 +23,6 @@ double area(const Filling& filling) {
     sum += 0.5 * (u.x * v.y - u.y * v.x);
   }
   return sum;
-}
-
-/// A star-shaped polygon with random radii: simple, and concave at about half its corners.
-std::vector<dvec2> random_star(std::mt19937& rng, int corners, double scale = 1) {
-  std::uniform_real_distribution<double> radius(0.2, 1.0);
-  std::vector<dvec2> p;
-  for (int i = 0; i < corners; ++i) {
-    const double angle = 2 * 3.14159265358979 * i / corners;
-    p.push_back(scale * radius(rng) * dvec2(std::cos(angle), std::sin(angle)));
-  }
-  return p;
-}
-
-Ring ring_of(size_t begin, size_t end) {
-  Ring ring;
-  for (size_t i = begin; i < end; ++i) ring.push_back(static_cast<Index>(i));
-  return ring;
 }
 
 TEST(FillRings, AnySimplePolygonIsFilledExactlyOnceFromItsCorners) {

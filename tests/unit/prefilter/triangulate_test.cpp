@@ -6,32 +6,17 @@
 #include <map>
 #include <random>
 
-#include "prefilter/fill_rings.h"
+#include "tests/support/polygons.h"
 
 namespace farfield {
 namespace {
 
 using glm::dvec2;
+using test::random_star;
+using test::ring_of;
 
 dvec3 area_vector(const std::vector<dvec3>& p, const uvec3& t) {
   return 0.5 * glm::cross(p[t.y] - p[t.x], p[t.z] - p[t.x]);
-}
-
-/// A star-shaped polygon with random radii: simple, and concave at about half its corners.
-std::vector<dvec2> random_star(std::mt19937& rng, int corners, double scale = 1) {
-  std::uniform_real_distribution<double> radius(0.2, 1.0);
-  std::vector<dvec2> p;
-  for (int i = 0; i < corners; ++i) {
-    const double angle = 2 * 3.14159265358979 * i / corners;
-    p.push_back(scale * radius(rng) * dvec2(std::cos(angle), std::sin(angle)));
-  }
-  return p;
-}
-
-Ring ring_of(size_t begin, size_t end) {
-  Ring ring;
-  for (size_t i = begin; i < end; ++i) ring.push_back(static_cast<uint32_t>(i));
-  return ring;
 }
 
 TEST(Triangulate, PolygonInSpaceKeepsItsWindingAndArea) {
