@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which parts of a light model an asset has at all. The models are templates on this set, so that what is absent costs
-// neither time nor memory; the choice is made once per level, not per sample.
+// neither time nor memory.
+//
+// Three of the 32 models occur in products, and the library holds no others. An Interaction is one type whatever was
+// hit, so it holds the two models with all channels (runtime/interaction_model.h); and a flake of the second scatters
+// as a flat surface, whose normals are not a channel. A host that chose per level would need more of them: what that is
+// worth is measured in docs/results/light.md, on the sets of tests/support/channel_sets.h.
 #pragma once
 
 #include <type_traits>
@@ -16,22 +21,9 @@ enum Channel : unsigned {
   kSelfShadowing = 16,  ///< flakes: A other than 1
 };
 
-inline constexpr unsigned kSurfaceChannels = kDiffuse | kSpecular | kTransmission | kNormals;
-inline constexpr unsigned kFlakeChannels = kDiffuse | kSpecular | kTransmission | kSelfShadowing;
-
-/// Calls visitor(std::integral_constant<unsigned, C>()) with C = channels & kAll: from a set known at run time to a
-/// template argument. Returns what it returns.
-template <unsigned kAll, unsigned kChosen = 0, unsigned kBit = 1, typename Visitor>
-decltype(auto) visit_channels(unsigned channels, Visitor&& visitor) {
-  if constexpr (kBit > kAll) {
-    return visitor(std::integral_constant<unsigned, kChosen>());
-  } else if constexpr ((kAll & kBit) == 0) {
-    return visit_channels<kAll, kChosen, kBit * 2>(channels, visitor);
-  } else {
-    return (channels & kBit) != 0 ? visit_channels<kAll, kChosen | kBit, kBit * 2>(channels, visitor)
-                                  : visit_channels<kAll, kChosen, kBit * 2>(channels, visitor);
-  }
-}
+inline constexpr unsigned kFlatChannels = kDiffuse | kSpecular | kTransmission;  ///< of a flat surface
+inline constexpr unsigned kSurfaceChannels = kFlatChannels | kNormals;
+inline constexpr unsigned kFlakeChannels = kFlatChannels | kSelfShadowing;
 
 /// What stands in a model for a part that it does not have: no bytes.
 template <typename Part>

@@ -78,7 +78,7 @@ class FlakeModel {
     float specular = 0, diffuse = 0, transmission = 0, multiple = 0;
   };
 
-  using Flake = SurfaceModel<kChannels&(kDiffuse | kSpecular | kTransmission)>;
+  using Flake = SurfaceModel<kChannels & kFlatChannels>;
 
   vec3 set_up_specular(const FlakeParams& params, const SymMat3& s) requires(kHasSpecular);
   void set_up_multiple(const FlakeParams& params, const SymMat3& s, const vec3& mean_fresnel) requires(kHasMultiple);

@@ -6,6 +6,7 @@
 
 #include "scattering/flake_phase.h"
 #include "scattering/surface_bsdf.h"
+#include "tests/support/channel_sets.h"
 #include "tests/support/statistics.h"
 
 namespace farfield {
