@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <chrono>
 #include <cmath>
@@ -19,8 +18,10 @@
 #include "bake/bake_workspace.h"
 #include "bake/pack_level.h"
 #include "bake/slab_hull.h"
+#include "bake/volume_job.h"
 #include "base/file_io.h"
 #include "base/hash.h"
+#include "base/index.h"
 #include "base/result.h"
 #include "bvh/level_scene.h"
 #include "cache/level_file.h"
@@ -33,8 +34,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint32_t kMaxGrid = 4096;       ///< the brick table has (grid / 8)^3 entries
-constexpr uint32_t kVoxelizeVersion = 5;  ///< goes up when voxelize() or pack_volume() give other results
+constexpr uint32_t kMaxGrid = 4096;  ///< the brick table has (grid / 8)^3 entries
 
 /// Seconds since it was made.
 class Stopwatch {
@@ -59,9 +59,10 @@ Result<void> check_options(const BakeOptions& options) {
 
 /// Equal text and source hash give equal bytes.
 std::string canonical_options(const BakeOptions& options) {
-  if (options.source_only) return fmt::format("source_only=1 mesh={}", options.import.mesh);
-  return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} mesh={} voxelize={}", options.finest_grid,
-                     options.coarsest_grid, options.rays_per_voxel, options.import.mesh, kVoxelizeVersion);
+  const std::string import = fmt::format("mesh={} condition={}", options.import.mesh, kConditionVersion);
+  if (options.source_only) return "source_only=1 " + import;
+  return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} {} voxelize={}", options.finest_grid,
+                     options.coarsest_grid, options.rays_per_voxel, import, kVoxelizeVersion);
 }
 
 /// What a bake of `source` with these options writes into its manifest, but for the levels.
@@ -121,7 +122,7 @@ SplitSurface split(const Surface& surface, const std::vector<uint8_t>& is_macros
   SplitSurface result;
   result.macrosurface.positions = surface.positions;
   result.macrosurface.origin = surface.origin;
-  std::vector<uint32_t> moved(surface.positions.size(), kUnused);
+  std::vector<uint32_t> moved(surface.positions.size(), kNoIndex);
   for (size_t f = 0; f < surface.triangles.size(); ++f) {
     if (is_macrosurface[f]) {
       result.macro_face.push_back(static_cast<uint32_t>(result.macrosurface.triangles.size()));
@@ -133,7 +134,7 @@ SplitSurface split(const Surface& surface, const std::vector<uint8_t>& is_macros
     uvec3 triangle = surface.triangles[f];
     for (int c = 0; c < 3; ++c) {
       uint32_t& vertex = moved[triangle[c]];
-      if (vertex == kUnused) {
+      if (vertex == kNoIndex) {
         vertex = static_cast<uint32_t>(sub_resolution.positions.size());
         sub_resolution.positions.push_back(surface.positions[triangle[c]]);
       }
@@ -143,16 +144,6 @@ SplitSurface split(const Surface& surface, const std::vector<uint8_t>& is_macros
     sub_resolution.materials.push_back(surface.materials[f]);
   }
   return result;
-}
-
-/// Everything that a packed volume depends on.
-uint64_t volume_key(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options) {
-  uint64_t key = mix64(kVoxelizeVersion, mix64(options.rays_per_voxel, options.seed));
-  const std::array<double, 4> place = {lattice.origin.x, lattice.origin.y, lattice.origin.z, lattice.voxel_size};
-  key = hash_values<double>(place, key);
-  key = hash_values<vec3>(geometry.positions, key);
-  key = hash_values<uvec3>(geometry.triangles, key);
-  return hash_values<FaceMaterial>(geometry.materials, key);
 }
 
 /// Less than what a level with such a volume and surface has resident.
@@ -288,18 +279,18 @@ class Baker {
     const std::string stage = fmt::format("level {}: voxelise", level);
     options_.job.report(share_done(level, 0.05), stage);
     const Stopwatch watch;
-    const VoxelLattice lattice{lattice_origin_, resolution};
-    const VoxelizeOptions voxelize_options{
-        .rays_per_voxel = options_.rays_per_voxel,
-        .seed = level,
-        .job = options_.job.step(stage, share_done(level, 0.05), share_done(level, 0.97))};
-    const uint64_t key = volume_key(sub_resolution_, lattice, voxelize_options);
-    if (auto stored = workspace_.load_volume(key)) {
+    const VolumeJob job{sub_resolution_,
+                        {lattice_origin_, resolution},
+                        {.rays_per_voxel = options_.rays_per_voxel,
+                         .seed = level,
+                         .job = options_.job.step(stage, share_done(level, 0.05), share_done(level, 0.97))}};
+    const std::string file_name = job.file_name();
+    if (auto stored = workspace_.load_volume(file_name)) {
       level_report.resumed = true;
       return std::move(*stored);
     }
     if (level != last_level_) {  // the root is always wanted
-      FARFIELD_TRY_LET(const auto size, estimate_volume(sub_resolution_, lattice, voxelize_options));
+      FARFIELD_TRY_LET(const auto size, estimate_volume(job.geometry, job.lattice, job.options));
       if (least_bytes(size, sub_resolution_, surface_) > most_bytes_worth_writing(level)) {
         level_report.worthless = true;
         level_report.triangles = surface_.triangles.size();
@@ -307,10 +298,9 @@ class Baker {
         return LevelData{};
       }
     }
-    FARFIELD_TRY_LET(const auto volume, voxelize(sub_resolution_, lattice, voxelize_options));
-    LevelData packed = pack_volume(volume);
+    FARFIELD_TRY_LET(LevelData packed, job.run());
     if (packed.has_volume()) {
-      if (const auto stored = workspace_.store_volume(key, packed); !stored) {
+      if (const auto stored = workspace_.store_volume(file_name, packed); !stored) {
         report_.warnings.push_back("an interrupted bake could not be resumed: " + stored.error().message);
       }
     }
@@ -412,7 +402,7 @@ Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeO
   }
   FARFIELD_TRY(check_replaceable(out));  // before the import, which may take minutes
   options.job.report(0, "import");
-  FARFIELD_TRY_LET(auto asset, import_asset(source, options.import));
+  FARFIELD_TRY_LET(auto asset, import_asset(source, options.import, options.job));
   asset.warnings = without_folder(std::move(asset.warnings), source.parent_path());
   const double import_seconds = watch.seconds();
   FARFIELD_TRY_LET(auto report, bake(std::move(asset), source.filename().string(), out, options));

@@ -89,6 +89,8 @@ Result<int> lock_folder(const fs::path& folder) {
   for (;;) {
     std::error_code error;
     fs::create_directories(folder, error);
+    // It was there, and another bake removed it before its kind was looked at.
+    if (error == std::errc::file_exists && !fs::exists(fs::symlink_status(folder))) continue;
     if (error) return io_error("create", folder, error);
     const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (descriptor < 0 && errno != ENOENT) return io_error("open", folder, std::strerror(errno));
@@ -172,16 +174,14 @@ Result<BakeWorkspace> BakeWorkspace::open(const fs::path& out_path) {
   return workspace;
 }
 
-fs::path BakeWorkspace::volume_path(uint64_t key) const { return folder_ / ("volume_" + to_hex(key) + ".ffl"); }
-
-std::optional<LevelData> BakeWorkspace::load_volume(uint64_t key) const {
-  const auto file = LevelFile::open(volume_path(key), LevelCheck::Full);
+std::optional<LevelData> BakeWorkspace::load_volume(const std::string& file_name) const {
+  const auto file = LevelFile::open(folder_ / file_name, LevelCheck::Full);
   if (!file) return std::nullopt;
   return copy_of((*file)->view());
 }
 
-Result<void> BakeWorkspace::store_volume(uint64_t key, const LevelData& volume) const {
-  FARFIELD_TRY(write_level(volume_path(key), volume));
+Result<void> BakeWorkspace::store_volume(const std::string& file_name, const LevelData& volume) const {
+  FARFIELD_TRY(write_level(folder_ / file_name, volume));
   return {};
 }
 

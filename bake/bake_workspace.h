@@ -30,10 +30,11 @@ class BakeWorkspace {
   /// Where the asset's files are to be written; empty at first.
   std::filesystem::path asset_dir() const { return folder_ / "asset"; }
 
-  /// The packed volume that an earlier bake stored under the key; nothing if there is none or it is damaged.
-  std::optional<LevelData> load_volume(uint64_t key) const;
+  /// The packed volume that an earlier bake stored under VolumeJob::file_name(); nothing if there is none or it is
+  /// damaged.
+  std::optional<LevelData> load_volume(const std::string& file_name) const;
   /// Stores a packed volume (pack_volume, not empty) for a later bake. Errors: Io.
-  Result<void> store_volume(uint64_t key, const LevelData& volume) const;
+  Result<void> store_volume(const std::string& file_name, const LevelData& volume) const;
 
   /// Makes asset_dir() the asset OUT, in one step also where OUT exists, and removes the workspace. Errors: those of
   /// check_replaceable(OUT), as it may have changed since open(), Io; what was at OUT is then untouched.
@@ -41,7 +42,6 @@ class BakeWorkspace {
 
  private:
   BakeWorkspace(std::filesystem::path out, std::filesystem::path folder, int lock);
-  std::filesystem::path volume_path(uint64_t key) const;
 
   std::filesystem::path out_;
   std::filesystem::path folder_;

@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "base/check.h"
+#include "base/index.h"
 #include "base/parallel.h"
 #include "prefilter/edge_table.h"
 
@@ -17,11 +18,9 @@ namespace {
 // ---------------------------------------------------------------------------------------------------------------
 // Pairing triangles into quads.
 
-constexpr uint32_t kNoFace = 0xffffffffu;
-
-/// Two triangles, or one and kNoFace, and which corner of each is not on the shared edge.
+/// Two triangles, or one and kNoIndex, and which corner of each is not on the shared edge.
 struct Pair {
-  uint32_t face0 = 0, face1 = kNoFace;
+  uint32_t face0 = 0, face1 = kNoIndex;
   uint32_t apex0 = 0, apex1 = 0;
 };
 
@@ -45,7 +44,7 @@ class Pairing {
       if (!is_free_[f]) continue;
       const uint32_t corner = longest_edge(f);
       const uint32_t g = partner(f, corner);
-      if (g != kNoFace && edges_.face_edges[g][longest_edge(g)] == edges_.face_edges[f][corner]) join(f, corner, g);
+      if (g != kNoIndex && edges_.face_edges[g][longest_edge(g)] == edges_.face_edges[f][corner]) join(f, corner, g);
     }
     std::vector<uint32_t> waiting;
     for (uint32_t f = 0; f < count; ++f) {
@@ -86,7 +85,7 @@ class Pairing {
   }
 
   /// A free triangle on the other side of the edge from `corner` to the next one, with the same winding and another
-  /// apex; or kNoFace.
+  /// apex; or kNoIndex.
   uint32_t partner(uint32_t face, uint32_t corner) const {
     const uint32_t edge = edge_of(face, corner);
     for (const uint32_t other : edges_.faces_of(edge)) {
@@ -95,12 +94,12 @@ class Pairing {
       const bool same_winding = vertex_of(other, c) == vertex_of(face, corner + 1);
       if (same_winding && vertex_of(other, c + 2) != vertex_of(face, corner + 2)) return other;
     }
-    return kNoFace;
+    return kNoIndex;
   }
 
   int choices(uint32_t face) const {
     int count = 0;
-    for (uint32_t c = 0; c < 3; ++c) count += partner(face, c) != kNoFace;
+    for (uint32_t c = 0; c < 3; ++c) count += partner(face, c) != kNoIndex;
     return count;
   }
 
@@ -112,16 +111,16 @@ class Pairing {
   /// Joins a triangle with the neighbour that has the fewest other choices, or leaves it alone; then those of the
   /// neighbours that are left with one choice wait for their turn.
   void join_best(uint32_t face, std::vector<uint32_t>& waiting) {
-    uint32_t best = kNoFace, best_corner = 0;
+    uint32_t best = kNoIndex, best_corner = 0;
     int fewest = 4;
     for (uint32_t c = 0; c < 3; ++c) {
       const uint32_t other = partner(face, c);
-      if (other == kNoFace) continue;
+      if (other == kNoIndex) continue;
       const int count = choices(other);
       const bool is_longer = length2_[edge_of(face, c)] > length2_[edge_of(face, best_corner)];
       if (count < fewest || (count == fewest && is_longer)) best = other, best_corner = c, fewest = count;
     }
-    if (best == kNoFace) {
+    if (best == kNoIndex) {
       is_free_[face] = false;
       pairs_.push_back({face});
       return;
@@ -130,7 +129,7 @@ class Pairing {
     for (const uint32_t joined : {face, best}) {
       for (uint32_t c = 0; c < 3; ++c) {
         const uint32_t neighbour = partner(joined, c);
-        if (neighbour != kNoFace && choices(neighbour) == 1) waiting.push_back(neighbour);
+        if (neighbour != kNoIndex && choices(neighbour) == 1) waiting.push_back(neighbour);
       }
     }
   }
@@ -167,7 +166,7 @@ void sort_along_curve(const Surface& surface, std::vector<Pair>& pairs) {
   for (uint32_t i = 0; i < pairs.size(); ++i) {
     Box3 bounds;
     for (const uint32_t face : {pairs[i].face0, pairs[i].face1}) {
-      if (face == kNoFace) continue;
+      if (face == kNoIndex) continue;
       for (int c = 0; c < 3; ++c) bounds.extend(surface.positions[surface.triangles[face][c]]);
     }
     keys[i] = {morton_code(bounds.center(), box), i};
@@ -284,12 +283,12 @@ SurfaceOrder order_surface(const Surface& surface) {
 
   SurfaceOrder order;
   order.quads.reserve(pairs.size());
-  order.vertex_number.assign(surface.positions.size(), kUnused);
+  order.vertex_number.assign(surface.positions.size(), kNoIndex);
   order.face_number.resize(surface.triangles.size());
   uint32_t vertex_count = 0, face = 0;
   const auto number_of = [&](uint32_t vertex) {
     uint32_t& number = order.vertex_number[vertex];
-    if (number == kUnused) number = vertex_count++;
+    if (number == kNoIndex) number = vertex_count++;
     return number;
   };
   for (const Pair& pair : pairs) {
@@ -301,7 +300,7 @@ SurfaceOrder order_surface(const Surface& surface) {
     quad.v3 = number_of(corner(2));
     quad.v2 = quad.v3;
     order.face_number[pair.face0] = face++;
-    if (pair.face1 != kNoFace) {
+    if (pair.face1 != kNoIndex) {
       quad.v2 = number_of(surface.triangles[pair.face1][static_cast<int>(pair.apex1)]);
       order.face_number[pair.face1] = face++;
     }
@@ -314,9 +313,9 @@ Surface reorder(const Surface& surface, const SurfaceOrder& order) {
   Surface result;
   result.origin = surface.origin;
   result.positions.resize(static_cast<size_t>(
-      std::count_if(order.vertex_number.begin(), order.vertex_number.end(), [](uint32_t n) { return n != kUnused; })));
+      std::count_if(order.vertex_number.begin(), order.vertex_number.end(), [](uint32_t n) { return n != kNoIndex; })));
   for (size_t v = 0; v < surface.positions.size(); ++v) {
-    if (order.vertex_number[v] != kUnused) result.positions[order.vertex_number[v]] = surface.positions[v];
+    if (order.vertex_number[v] != kNoIndex) result.positions[order.vertex_number[v]] = surface.positions[v];
   }
   for (const Quad& quad : order.quads) {
     result.triangles.push_back({quad.v0, quad.v1, quad.v3});
@@ -331,7 +330,7 @@ LevelData pack_volume(const SparseVolume& volume) {
   LevelData level;
   level.header.resolution = static_cast<float>(volume.lattice.voxel_size);
   if (volume.bricks.empty()) return level;
-  FARFIELD_CHECK(volume.voxels.size() < kUnused);
+  FARFIELD_CHECK(volume.voxels.size() < kNoIndex);
   ivec3 lower = volume.bricks.front().coordinate, upper = lower;
   for (const VoxelBrick& brick : volume.bricks) {
     lower = glm::min(lower, brick.coordinate);

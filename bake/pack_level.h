@@ -5,19 +5,18 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/index.h"
 #include "cache/level.h"
 #include "prefilter/surface.h"
 #include "prefilter/voxelize.h"
 
 namespace farfield {
 
-inline constexpr uint32_t kUnused = 0xffffffffu;  ///< a vertex that no triangle uses
-
 /// The final numbering of a surface: triangles paired into quads, quads along a Morton curve, faces in the order of the
 /// quads, vertices in the order of their first use.
 struct SurfaceOrder {
   std::vector<Quad> quads;              ///< in final vertex numbers
-  std::vector<uint32_t> vertex_number;  ///< for each vertex of the surface: its final number or kUnused
+  std::vector<uint32_t> vertex_number;  ///< for each vertex of the surface: its final number or kNoIndex
   std::vector<uint32_t> face_number;    ///< for each triangle: its final number
 };
 

@@ -12,6 +12,7 @@ find_package(PkgConfig REQUIRED)
 pkg_check_modules(xxhash REQUIRED IMPORTED_TARGET libxxhash)
 
 if(FARFIELD_BUILD_BAKE)
+  pkg_check_modules(glu REQUIRED IMPORTED_TARGET glu)
   find_package(ZLIB REQUIRED)
   find_package(TinyGLTF CONFIG REQUIRED)
   find_package(tinyobjloader CONFIG REQUIRED)

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "base/hash.h"
+#include "base/index.h"
 #include "import/read_file.h"
 #include "import/read_formats.h"
 #include "import/text_cursor.h"
@@ -17,8 +18,6 @@ namespace farfield {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr uint32_t kNone = UINT32_MAX;
 
 /// Materials and textures of the libraries that an OBJ names, by name.
 class MaterialLibraries {
@@ -43,7 +42,7 @@ class MaterialLibraries {
   }
 
   uint32_t default_material() {
-    if (default_ == kNone) {
+    if (default_ == kNoIndex) {
       default_ = static_cast<uint32_t>(mesh_.materials.size());
       mesh_.materials.emplace_back();
     }
@@ -172,7 +171,7 @@ class MaterialLibraries {
   SourceMesh& mesh_;
   std::map<std::string, uint32_t, std::less<>> by_name_;
   std::map<std::pair<std::string, TextureUse>, std::shared_ptr<const Texture>> images_;
-  uint32_t default_ = kNone;
+  uint32_t default_ = kNoIndex;
   Result<void> ready_;
 };
 
@@ -257,10 +256,10 @@ class ObjReader {
     uvs_.emplace_back(static_cast<float>(u), static_cast<float>(1.0 - v));  // OBJ's v points up
   }
 
-  /// OBJ counts from 1, or back from the latest with negative numbers. Bad ones become kNone.
+  /// OBJ counts from 1, or back from the latest with negative numbers. Bad ones become kNoIndex.
   static uint32_t resolve(int64_t index, size_t count) {
     if (index < 0) index += static_cast<int64_t>(count) + 1;
-    return index >= 1 && index < kNone ? static_cast<uint32_t>(index - 1) : kNone;
+    return index >= 1 && index < kNoIndex ? static_cast<uint32_t>(index - 1) : kNoIndex;
   }
 
   void read_face() {
@@ -269,7 +268,7 @@ class ObjReader {
       int64_t index = 0;
       if (!text_.integer(index)) break;
       mesh_.corner_position.push_back(resolve(index, mesh_.positions.size()));
-      uint32_t uv = kNone;
+      uint32_t uv = kNoIndex;
       if (text_.peek() == '/') {
         text_.advance();
         if (text_.peek() != '/' && is_digit(text_.peek()) && text_.integer(index)) uv = resolve(index, uvs_.size());
@@ -281,7 +280,7 @@ class ObjReader {
       corner_uv_index_.push_back(uv);
     }
     skip_line();
-    if (material_ == kNone) material_ = materials_.default_material();
+    if (material_ == kNoIndex) material_ = materials_.default_material();
     mesh_.face_begin.push_back(static_cast<uint32_t>(mesh_.corner_count()));
     mesh_.face_material.push_back(material_);
   }
@@ -336,7 +335,7 @@ class ObjReader {
   std::string name_;
   SourceMesh mesh_;
   MaterialLibraries materials_;
-  uint32_t material_ = kNone;
+  uint32_t material_ = kNoIndex;
   std::vector<vec2> uvs_;
   std::vector<vec3> colors_;
   std::vector<uint32_t> corner_uv_index_;

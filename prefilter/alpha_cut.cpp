@@ -6,7 +6,7 @@
 //   |  \               inside on their left; they chain into closed loops, along the triangle's border where the
 //   |####\             inside touches it (counter-clockwise loops are outlines, clockwise ones holes)
 //   |#####>\           3. straighten the loops [Douglas and Peucker 1973]; crossings on the border stay where they are
-//   A--##----B         4. join holes, clip ears, flip edges to Delaunay
+//   A--##----B         4. fill them by a sweep line, flip edges to Delaunay
 //
 // All loops live in lattice coordinates (s, t): the point A + s (B - A) + t (C - A).
 #include "prefilter/alpha_cut.h"
@@ -16,7 +16,8 @@
 #include <map>
 #include <numeric>
 
-#include "prefilter/ear_clipping.h"
+#include "base/index.h"
+#include "prefilter/fill_rings.h"
 
 namespace farfield {
 namespace {
@@ -92,7 +93,7 @@ using Loop = std::vector<LoopPoint>;
 class Outline {
  public:
   explicit Outline(const Lattice& lattice) : lattice_(lattice), n_(lattice.size()) {
-    next_.assign(3 * static_cast<size_t>(n_ + 1) * static_cast<size_t>(n_ + 1), kNone);
+    next_.assign(3 * static_cast<size_t>(n_ + 1) * static_cast<size_t>(n_ + 1), kNoIndex);
     for (int j = 0; j < n_; ++j) {
       for (int i = 0; i + j < n_; ++i) {
         march({{{i, j}, {i + 1, j}, {i, j + 1}}});
@@ -106,13 +107,13 @@ class Outline {
   std::vector<Loop> loops() {
     std::vector<Loop> out;
     for (uint32_t start = 0; start < next_.size(); ++start) {
-      if (next_[start] == kNone) continue;
+      if (next_[start] == kNoIndex) continue;
       Loop loop;
       uint32_t at = start;
-      while (next_[at] != kNone) {
+      while (next_[at] != kNoIndex) {
         loop.push_back({position(at), is_on_border(at)});
         const uint32_t following = next_[at];
-        next_[at] = kNone;
+        next_[at] = kNoIndex;
         at = following;
         if (const auto inner = border_.find(at); inner != border_.end()) {
           loop.push_back({position(at), true});
@@ -129,7 +130,6 @@ class Outline {
   }
 
  private:
-  static constexpr uint32_t kNone = UINT32_MAX;
   using Node = std::array<int, 2>;
 
   /// From where the outline comes in on the border, along the border to where it leaves it.
@@ -196,7 +196,7 @@ class Outline {
     size_t start = 0;
     while (start < count && is_inside(nodes[start])) ++start;
     if (start == count) return;  // all inside: no crossings
-    uint32_t enter = kNone;
+    uint32_t enter = kNoIndex;
     std::vector<dvec2> corners;
     for (size_t k = 0; k < count; ++k) {
       const Node &a = nodes[(start + k) % count], &b = nodes[(start + k + 1) % count];
@@ -302,58 +302,26 @@ double twice_area(const std::vector<Loop>& loops) {
   return sum;
 }
 
-bool is_inside(const Loop& loop, const dvec2& p) {
-  bool inside = false;
-  for (size_t k = 0; k < loop.size(); ++k) {
-    const dvec2 &a = loop[k].at, &b = loop[(k + 1) % loop.size()].at;
-    if ((a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)) inside = !inside;
-  }
-  return inside;
-}
-
-/// A filled set of loops.
-struct Filling {
-  std::vector<dvec2> points;
-  std::vector<uvec3> triangles;
-};
-
 double twice_area(const Filling& filling, const uvec3& t) {
   const dvec2 &a = filling.points[t.x], &b = filling.points[t.y], &c = filling.points[t.z];
   return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
 Filling fill(const std::vector<Loop>& loops) {
-  Filling out;
+  std::vector<dvec2> points;
   std::vector<Ring> rings;
   for (const Loop& loop : loops) {
     Ring ring(loop.size());
-    std::iota(ring.begin(), ring.end(), static_cast<uint32_t>(out.points.size()));
-    for (const LoopPoint& p : loop) out.points.push_back(p.at);
+    std::iota(ring.begin(), ring.end(), static_cast<Index>(points.size()));
+    for (const LoopPoint& p : loop) points.push_back(p.at);
     rings.push_back(std::move(ring));
   }
-  // Each hole belongs to the smallest outline around it.
-  std::vector<std::vector<Ring>> holes(loops.size());
-  for (size_t h = 0; h < loops.size(); ++h) {
-    if (loops[h].size() < 3 || twice_area(loops[h]) >= 0) continue;
-    size_t owner = loops.size();
-    for (size_t o = 0; o < loops.size(); ++o) {
-      const double area = twice_area(loops[o]);
-      if (area <= 0 || !is_inside(loops[o], loops[h][0].at)) continue;
-      if (owner == loops.size() || area < twice_area(loops[owner])) owner = o;
-    }
-    if (owner < loops.size()) holes[owner].push_back(rings[h]);
-  }
-  for (size_t o = 0; o < loops.size(); ++o) {
-    if (loops[o].size() < 3 || twice_area(loops[o]) <= 0) continue;
-    const auto triangles = clip_ears(out.points, join_holes(out.points, rings[o], holes[o]));
-    out.triangles.insert(out.triangles.end(), triangles.begin(), triangles.end());
-  }
+  Filling out = fill_rings(std::move(points), rings, Winding::Positive);
   std::erase_if(out.triangles, [&](const uvec3& t) { return twice_area(out, t) == 0; });
   return out;
 }
 
-/// Flips inner edges until every one is locally Delaunay in texel space [Lawson 1977]: ear clipping alone leaves
-/// needles.
+/// Flips inner edges until every one is locally Delaunay in texel space [Lawson 1977]: a sweep line leaves needles.
 void flip_to_delaunay(Filling& filling, const TexelMetric& metric) {
   using Edge = std::pair<uint32_t, uint32_t>;
   const auto position = [&](uint32_t v) { return metric(filling.points[v]); };
@@ -367,15 +335,15 @@ void flip_to_delaunay(Filling& filling, const TexelMetric& metric) {
     const uvec3& t = filling.triangles[triangle];
     for (int k = 0; k < 3; ++k) {
       auto& sides =
-          faces.try_emplace(name(t[k], t[(k + 1) % 3]), std::array<uint32_t, 2>{UINT32_MAX, UINT32_MAX}).first->second;
-      (sides[0] == UINT32_MAX ? sides[0] : sides[1]) = triangle;
+          faces.try_emplace(name(t[k], t[(k + 1) % 3]), std::array<uint32_t, 2>{kNoIndex, kNoIndex}).first->second;
+      (sides[0] == kNoIndex ? sides[0] : sides[1]) = triangle;
     }
   };
   for (uint32_t i = 0; i < filling.triangles.size(); ++i) link(i);
 
   std::vector<Edge> stack;
   for (const auto& [edge, sides] : faces) {
-    if (sides[1] != UINT32_MAX) stack.push_back(edge);
+    if (sides[1] != kNoIndex) stack.push_back(edge);
   }
   const auto replace_side = [&](Edge edge, uint32_t from, uint32_t to) {
     for (uint32_t& side : faces[edge]) {
@@ -391,7 +359,7 @@ void flip_to_delaunay(Filling& filling, const TexelMetric& metric) {
     const Edge edge = stack.back();
     stack.pop_back();
     const auto found = faces.find(edge);
-    if (found == faces.end() || found->second[1] == UINT32_MAX) continue;
+    if (found == faces.end() || found->second[1] == kNoIndex) continue;
     const uint32_t left = found->second[0], right = found->second[1];
     uvec3 &l = filling.triangles[left], &r = filling.triangles[right];
     int k = 0;

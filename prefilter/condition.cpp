@@ -10,6 +10,7 @@
 #include <unordered_set>
 
 #include "base/hash.h"
+#include "base/index.h"
 #include "base/parallel.h"
 #include "base/result.h"
 #include "prefilter/alpha_cut.h"
@@ -20,8 +21,6 @@ namespace farfield {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr uint32_t kNone = UINT32_MAX;
 constexpr size_t kMaxWarnings = 50;
 
 // Longest sides that the bake's single precision can work in: areas and their squares stay normal numbers down to faces
@@ -166,7 +165,7 @@ std::vector<CornerTriangle> triangulate(SourceMesh& mesh, const WeldResult& weld
 /// Turns triangles with corner attributes into a surface with a material per face.
 class SurfaceBuilder {
  public:
-  SurfaceBuilder(const SourceMesh& mesh, std::vector<vec3> positions) : mesh_(mesh) {
+  SurfaceBuilder(const SourceMesh& mesh, std::vector<vec3> positions, const Job& job) : mesh_(mesh), job_(job) {
     surface_.positions = std::move(positions);
   }
 
@@ -175,11 +174,11 @@ class SurfaceBuilder {
     std::vector<FaceMaterial> materials(triangles.size());
     parallel_for(triangles.size(), 1024, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
-        if (pattern_of_[i] == kNone) materials[i] = plain_material(triangles[i]);
+        if (pattern_of_[i] == kNoIndex) materials[i] = plain_material(triangles[i]);
       }
     });
     for (size_t i = 0; i < triangles.size(); ++i) {
-      if (pattern_of_[i] == kNone) {
+      if (pattern_of_[i] == kNoIndex) {
         surface_.triangles.push_back(triangles[i].vertex);
         surface_.materials.push_back(materials[i]);
       } else {
@@ -222,7 +221,7 @@ class SurfaceBuilder {
 
   /// Gives each masked triangle its pattern, and cuts all patterns.
   void find_patterns(const std::vector<CornerTriangle>& triangles) {
-    pattern_of_.assign(triangles.size(), kNone);
+    pattern_of_.assign(triangles.size(), kNoIndex);
     std::unordered_map<uint64_t, std::vector<uint32_t>> by_hash;
     std::vector<std::vector<MaskedTriangle>> of_material(mesh_.materials.size());
     for (size_t i = 0; i < triangles.size(); ++i) {
@@ -252,7 +251,8 @@ class SurfaceBuilder {
       subdivisions.push_back(cut_subdivisions(mesh_.materials[m], of_material[m]));
     }
     parallel_for(patterns_.size(), 1, [&](size_t begin, size_t end) {
-      for (size_t p = begin; p < end; ++p) fill_pattern(patterns_[p], subdivisions[patterns_[p].material]);
+      for (size_t p = begin; p < end && !job_.is_cancelled(); ++p)
+        fill_pattern(patterns_[p], subdivisions[patterns_[p].material]);
     });
   }
 
@@ -316,11 +316,11 @@ class SurfaceBuilder {
   }
 
   void drop_unused_vertices() {
-    std::vector<uint32_t> target(surface_.positions.size(), kNone);
+    std::vector<uint32_t> target(surface_.positions.size(), kNoIndex);
     std::vector<vec3> kept;
     for (uvec3& t : surface_.triangles) {
       for (int k = 0; k < 3; ++k) {
-        if (target[t[k]] == kNone) {
+        if (target[t[k]] == kNoIndex) {
           target[t[k]] = static_cast<uint32_t>(kept.size());
           kept.push_back(surface_.positions[t[k]]);
         }
@@ -331,8 +331,9 @@ class SurfaceBuilder {
   }
 
   const SourceMesh& mesh_;
+  const Job& job_;
   Surface surface_;
-  std::vector<uint32_t> pattern_of_;  ///< per triangle; kNone: not masked
+  std::vector<uint32_t> pattern_of_;  ///< per triangle; kNoIndex: not masked
   std::vector<Pattern> patterns_;
   std::unordered_map<uvec3, uint32_t, TriangleKeyHash> on_edge_;
 };
@@ -348,7 +349,7 @@ std::vector<std::string> limit(std::vector<std::string> warnings) {
 
 }  // namespace
 
-Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name) {
+Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name, const Job& job) {
   drop_faces_that_are_not_finite(mesh);
   FARFIELD_TRY_LET(const auto origin, choose_origin(mesh, name));
   std::vector<vec3> positions;
@@ -363,7 +364,8 @@ Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name) {
   const std::vector<CornerTriangle> triangles = triangulate(mesh, welded);
 
   ImportedAsset asset;
-  asset.surface = SurfaceBuilder(mesh, std::move(welded.positions)).build(triangles);
+  asset.surface = SurfaceBuilder(mesh, std::move(welded.positions), job).build(triangles);
+  if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, fmt::format("{}: cancelled", name));
   asset.surface.origin = origin;
   if (asset.surface.triangles.empty()) {
     return make_error(ErrorCode::BadFile, fmt::format("{}: no face has any area", name));
@@ -374,9 +376,9 @@ Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name) {
   return asset;
 }
 
-Result<ImportedAsset> import_asset(const fs::path& path, const ImportOptions& options) {
+Result<ImportedAsset> import_asset(const fs::path& path, const ImportOptions& options, const Job& job) {
   FARFIELD_TRY_LET(auto mesh, read_source(path, options));
-  return condition(std::move(mesh), path.string());
+  return condition(std::move(mesh), path.string(), job);
 }
 
 }  // namespace farfield

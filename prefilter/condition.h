@@ -7,11 +7,15 @@
 #include <string>
 #include <vector>
 
+#include "base/job.h"
 #include "base/result.h"
 #include "import/read_source.h"
 #include "prefilter/surface.h"
 
 namespace farfield {
+
+/// Goes up when condition() gives other results.
+inline constexpr uint32_t kConditionVersion = 2;
 
 struct ImportedAsset {
   Surface surface;
@@ -23,11 +27,13 @@ struct ImportedAsset {
 /// Polygons are triangulated (quads along the diagonal that lies inside, the shorter of two; concave ones correctly),
 /// vertices that share a position up to rounding are welded, triangles that coincide are kept once, textures are
 /// averaged over each face, alpha-masked faces are cut along the mask's outline, degenerate and NaN faces are dropped
-/// with a warning. What materials become is written in docs/decisions/0006. `name` is for messages. Errors: BadFile (no
-/// face with area is left), Unsupported (a longest side outside [1e-6, 1e9], which single precision cannot work in).
-Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name);
+/// with a warning. What materials become is written in docs/decisions/0006. `name` is for messages; the job is polled
+/// for every mask that is cut. Errors: Cancelled; BadFile (no face with area is left), Unsupported (a longest side
+/// outside [1e-6, 1e9], which single precision cannot work in).
+Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name, const Job& job = {});
 
 /// read_source() and condition(). Errors: those of both.
-Result<ImportedAsset> import_asset(const std::filesystem::path& path, const ImportOptions& options = {});
+Result<ImportedAsset> import_asset(const std::filesystem::path& path, const ImportOptions& options = {},
+                                   const Job& job = {});
 
 }  // namespace farfield

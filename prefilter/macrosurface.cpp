@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/index.h"
 #include "base/parallel.h"
 #include "prefilter/edge_table.h"
 #include "prefilter/index_map.h"
@@ -188,12 +189,11 @@ struct Patches {
 
 /// Grows connected patches around seeds, in face order. Faces larger than a patch stay alone: the thesis's evaluation.
 Patches make_patches(const Surface& surface, const EdgeTable& edges, double radius) {
-  constexpr uint32_t kNone = 0xffffffffu;
   Patches patches;
-  patches.patch_of_face.assign(surface.triangles.size(), kNone);
+  patches.patch_of_face.assign(surface.triangles.size(), kNoIndex);
   std::vector<uint32_t> front;
   for (uint32_t seed = 0; seed < surface.triangles.size(); ++seed) {
-    if (patches.patch_of_face[seed] != kNone) continue;
+    if (patches.patch_of_face[seed] != kNoIndex) continue;
     const uint32_t patch = static_cast<uint32_t>(patches.seeds.size());
     patches.seeds.push_back(seed);
     patches.patch_of_face[seed] = patch;
@@ -211,7 +211,7 @@ Patches make_patches(const Surface& surface, const EdgeTable& edges, double radi
       front.pop_back();
       for (int c = 0; c < 3; ++c) {
         for (const uint32_t neighbour : edges.faces_of(edges.face_edges[face][c])) {
-          if (patches.patch_of_face[neighbour] != kNone || !is_near(neighbour)) continue;
+          if (patches.patch_of_face[neighbour] != kNoIndex || !is_near(neighbour)) continue;
           patches.patch_of_face[neighbour] = patch;
           front.push_back(neighbour);
         }

@@ -9,6 +9,7 @@
 #include <queue>
 #include <span>
 
+#include "base/index.h"
 #include "base/parallel.h"
 #include "cache/level.h"
 #include "prefilter/edge_table.h"
@@ -18,8 +19,6 @@
 namespace farfield {
 
 namespace {
-
-constexpr uint32_t kNone = 0xffffffffu;
 
 constexpr double kShortEdge = 0.36;  ///< edges below this part of the resolution collapse (thesis 7.3: about eps / 2)
 constexpr double kLongEdge = 1.0;    ///< and none becomes longer than this part (8.1.1)
@@ -383,7 +382,7 @@ class Simplifier {
     for (const Spoke& spoke : spokes) {
       if (spoke.faces != 2 && spoke.vertex != excluded) return spoke.vertex;
     }
-    return kNone;
+    return kNoIndex;
   }
 
   bool is_valid(uint32_t a, uint32_t b, const Placement& placement) const {
@@ -456,7 +455,7 @@ class Simplifier {
 struct Parts {
   std::vector<uint32_t> first_face, faces;       ///< part i has faces[first_face[i]] to faces[first_face[i + 1]]
   std::vector<uint32_t> first_vertex, vertices;  ///< likewise
-  std::vector<uint32_t> local_vertex;            ///< per vertex of the surface: its number within its part, or kNone
+  std::vector<uint32_t> local_vertex;            ///< per vertex of the surface: its number within its part, or kNoIndex
 
   size_t size() const { return first_face.size() - 1; }
   std::span<const uint32_t> faces_of(size_t part) const {
@@ -467,18 +466,18 @@ struct Parts {
   }
 };
 
-/// Sorts 0 .. part_of.size() - 1 by part; kNone is left out.
+/// Sorts 0 .. part_of.size() - 1 by part; kNoIndex is left out.
 void group_by_part(const std::vector<uint32_t>& part_of, size_t part_count, std::vector<uint32_t>& first,
                    std::vector<uint32_t>& items) {
   first.assign(part_count + 1, 0);
   for (const uint32_t part : part_of) {
-    if (part != kNone) ++first[part + 1];
+    if (part != kNoIndex) ++first[part + 1];
   }
   for (size_t part = 0; part < part_count; ++part) first[part + 1] += first[part];
   items.resize(first.back());
   std::vector<uint32_t> next(first.begin(), first.end() - 1);
   for (uint32_t i = 0; i < part_of.size(); ++i) {
-    if (part_of[i] != kNone) items[next[part_of[i]]++] = i;
+    if (part_of[i] != kNoIndex) items[next[part_of[i]]++] = i;
   }
 }
 
@@ -496,11 +495,11 @@ Parts find_parts(const Surface& surface) {
     }
   }
 
-  std::vector<uint32_t> part_of_vertex(surface.positions.size(), kNone), part_of_face(surface.triangles.size());
+  std::vector<uint32_t> part_of_vertex(surface.positions.size(), kNoIndex), part_of_face(surface.triangles.size());
   uint32_t part_count = 0;
   for (size_t face = 0; face < surface.triangles.size(); ++face) {
     uint32_t& part = part_of_vertex[find_root(surface.triangles[face].x)];
-    if (part == kNone) part = part_count++;
+    if (part == kNoIndex) part = part_count++;
     part_of_face[face] = part;
   }
   for (const uvec3& t : surface.triangles) {
@@ -510,7 +509,7 @@ Parts find_parts(const Surface& surface) {
   Parts parts;
   group_by_part(part_of_face, part_count, parts.first_face, parts.faces);
   group_by_part(part_of_vertex, part_count, parts.first_vertex, parts.vertices);
-  parts.local_vertex.assign(surface.positions.size(), kNone);
+  parts.local_vertex.assign(surface.positions.size(), kNoIndex);
   for (size_t part = 0; part < part_count; ++part) {
     uint32_t next = 0;
     for (const uint32_t vertex : parts.vertices_of(part)) parts.local_vertex[vertex] = next++;
@@ -559,7 +558,7 @@ SimplifyResult compact(const WorkingSurface& working, const Parts& parts) {
   result.surface.origin = from.origin;
   result.vertex_map.assign(from.positions.size(), kMorphVoxelized);
   for (uint32_t v = 0; v < from.positions.size(); ++v) {
-    if (parts.local_vertex[v] == kNone || working.merged_into[v] != v) continue;
+    if (parts.local_vertex[v] == kNoIndex || working.merged_into[v] != v) continue;
     result.vertex_map[v] = static_cast<uint32_t>(result.surface.positions.size());
     result.surface.positions.push_back(from.positions[v]);
   }

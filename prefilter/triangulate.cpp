@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <tuple>
 
-#include "prefilter/ear_clipping.h"
+#include "prefilter/fill_rings.h"
 
 namespace farfield {
 namespace {
@@ -51,13 +51,22 @@ std::vector<uvec3> triangulate_ngon(std::span<const dvec3> p) {
     ring.push_back(static_cast<uint32_t>(points.size()));
     points.emplace_back(glm::dot(corner - p[0], x), glm::dot(corner - p[0], y));
   }
-  return clip_ears(points, ring);
+  const size_t given = points.size();
+  Filling filling = fill_rings(std::move(points), {&ring, 1}, Winding::Nonzero);
+  // Polygons that cross themselves: their corners are all there is, so a crossing goes to the nearest of them.
+  for (uvec3& t : filling.triangles) {
+    for (int k = 0; k < 3; ++k) {
+      if (t[k] >= given) t[k] = filling.nearest[t[k] - given];
+    }
+  }
+  std::erase_if(filling.triangles, [](const uvec3& t) { return t.x == t.y || t.y == t.z || t.z == t.x; });
+  return std::move(filling.triangles);
 }
 
 }  // namespace
 
 std::vector<uvec3> triangulate_polygon(std::span<const dvec3> corners) {
-  if (corners.size() < 3 || corners.size() > kMaxPolygonCorners) return {};
+  if (corners.size() < 3) return {};
   for (const dvec3& c : corners) {
     if (!std::isfinite(c.x) || !std::isfinite(c.y) || !std::isfinite(c.z)) return {};
   }

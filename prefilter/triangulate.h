@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Triangles from the polygons of a mesh: quads along the better diagonal, larger ones by ear clipping.
+// Triangles from the polygons of a mesh: quads along the better diagonal, larger ones by a sweep line.
 #pragma once
 
 #include <span>
@@ -9,13 +9,10 @@
 
 namespace farfield {
 
-/// Larger polygons are refused by triangulate_polygon: ear clipping takes quadratic time.
-inline constexpr size_t kMaxPolygonCorners = 20000;
-
 /// Cuts the polygon with these corners (in order, not necessarily plane or convex) into corner-index triples; all use
 /// the polygon's winding. Three corners give one triangle; four are cut along the diagonal that lies inside, and where
 /// both do along the shorter one (the pair shares corners 0 and 2, or 1 and 3); more are projected along their mean
-/// normal and ear clipped in double. Fewer than three, more than kMaxPolygonCorners or non-finite corners give nothing.
+/// normal and filled in double, O(n log n). Fewer than three or non-finite corners give nothing.
 std::vector<uvec3> triangulate_polygon(std::span<const dvec3> corners);
 
 }  // namespace farfield

@@ -254,7 +254,7 @@ VoxelSet find_candidates(const Surface& geometry, const VoxelLattice& lattice) {
   return widen(mark_voxels(geometry, lattice), kReach);
 }
 
-/// The kept voxels of every stride-th candidate brick; the masks of these bricks become theirs.
+/// The kept voxels of every stride-th candidate brick of the range; the masks of these bricks become theirs.
 Result<std::vector<std::vector<Voxel>>> measure_bricks(const Surface& geometry, const VoxelLattice& lattice,
                                                        VoxelSet& candidates, size_t stride,
                                                        const VoxelizeOptions& options) {
@@ -262,12 +262,14 @@ Result<std::vector<std::vector<Voxel>>> measure_bricks(const Surface& geometry, 
   if (voxels.empty()) return voxels;
   FARFIELD_TRY_LET(const RayScene rays, RayScene::build(geometry));
   const Measurement measurement{geometry, lattice, rays, rays_per_voxel(candidates.size(), options), options.seed};
-  const size_t count = (voxels.size() + stride - 1) / stride;
+  const size_t first = std::min<uint64_t>(options.bricks.first, voxels.size());
+  const size_t last = first + std::min<uint64_t>(options.bricks.count, voxels.size() - first);
+  const size_t count = (last - first + stride - 1) / stride;
   std::atomic<size_t> done{0};  // relaxed: only for the progress
   const std::thread::id caller = std::this_thread::get_id();
   parallel_for(count, 4, [&](size_t begin, size_t end) {
     if (options.job.is_cancelled()) return;
-    for (size_t i = begin * stride; i < end * stride && i < voxels.size(); i += stride) {
+    for (size_t i = first + begin * stride; i < std::min(first + end * stride, last); i += stride) {
       voxels[i] = measure_brick(measurement, candidates.coordinates[i], candidates.masks[i]);
     }
     const size_t bricks_done = done.fetch_add(end - begin, std::memory_order_relaxed) + end - begin;
@@ -298,6 +300,10 @@ Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& latti
   return volume;
 }
 
+uint64_t candidate_bricks(const Surface& geometry, const VoxelLattice& lattice) {
+  return find_candidates(geometry, lattice).coordinates.size();
+}
+
 Result<VolumeSize> estimate_volume(const Surface& geometry, const VoxelLattice& lattice,
                                    const VoxelizeOptions& options) {
   constexpr size_t kStride = 32, kEnoughBricks = 64;
@@ -307,6 +313,7 @@ Result<VolumeSize> estimate_volume(const Surface& geometry, const VoxelLattice& 
   if (candidates.coordinates.size() < kStride * kEnoughBricks) return size;
   VoxelizeOptions quietly = options;
   quietly.job = options.job.quiet();
+  quietly.bricks = {};
   FARFIELD_TRY_LET(const auto voxels, measure_bricks(geometry, lattice, candidates, kStride, quietly));
   for (const std::vector<Voxel>& of_brick : voxels) {
     size.voxels += kStride * of_brick.size();

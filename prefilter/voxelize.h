@@ -40,9 +40,17 @@ struct SparseVolume {
   std::vector<Voxel> voxels;
 };
 
+/// Some of the bricks that may hold voxels, by their number in the order of SparseVolume::bricks. Ranges that follow
+/// each other give volumes that follow each other: together just what the whole gives.
+struct BrickRange {
+  uint64_t first = 0;
+  uint64_t count = ~uint64_t{0};  ///< as far as there are bricks
+};
+
 struct VoxelizeOptions {
   uint32_t rays_per_voxel = 200;  ///< > 0; see voxelize()
   uint64_t seed = 0;              ///< with the voxel's coordinate it fixes the voxel's rays
+  BrickRange bricks{};            ///< to measure; candidate_bricks() says how many there are
   Job job{};                      ///< reports from the calling thread alone; polled for every few bricks
 };
 
@@ -57,6 +65,9 @@ inline constexpr double kFaintestDepth = 0.02;
 /// threads. Errors: Cancelled; InvalidArgument (options, or geometry further than about a million voxels from the
 /// origin); Io (out of memory in Embree).
 Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options);
+
+/// The number of bricks that voxelize() looks at, some of which turn out empty. Fast: no ray is cast.
+uint64_t candidate_bricks(const Surface& geometry, const VoxelLattice& lattice);
 
 /// What a volume would hold.
 struct VolumeSize {

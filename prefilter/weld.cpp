@@ -6,11 +6,10 @@
 #include <cstring>
 
 #include "base/hash.h"
+#include "base/index.h"
 
 namespace farfield {
 namespace {
-
-constexpr uint32_t kNone = UINT32_MAX;
 constexpr float kNearOfBounds = 1e-6f;  // what six written decimals can tell apart
 constexpr float kNearOfEdge = 0.01f;
 // A cell with more vertices than this is finely modelled on purpose; also bounds the work on hostile input.
@@ -20,7 +19,7 @@ constexpr int kMaxPerCell = 64;
 class VertexTable {
  public:
   explicit VertexTable(size_t vertex_count)
-      : heads_(std::bit_ceil(std::max<size_t>(16, 2 * vertex_count)), kNone), next_(vertex_count, kNone) {}
+      : heads_(std::bit_ceil(std::max<size_t>(16, 2 * vertex_count)), kNoIndex), next_(vertex_count, kNoIndex) {}
 
   uint32_t first(uint64_t key) const { return heads_[key & (heads_.size() - 1)]; }
   uint32_t next(uint32_t vertex) const { return next_[vertex]; }
@@ -48,16 +47,16 @@ uint64_t cell_key(const glm::i64vec3& cell) {
 /// Output vertices by exact position, in order of first use.
 WeldResult weld_exactly(std::span<const vec3> positions, std::span<const uint32_t> corner_vertex) {
   WeldResult result;
-  result.vertex_of.assign(positions.size(), kNone);
+  result.vertex_of.assign(positions.size(), kNoIndex);
   VertexTable table(positions.size());
   for (const uint32_t vertex : corner_vertex) {
     uint32_t& target = result.vertex_of[vertex];
-    if (target != kNone) continue;
+    if (target != kNoIndex) continue;
     const uint64_t key = position_key(positions[vertex]);
-    for (uint32_t v = table.first(key); v != kNone && target == kNone; v = table.next(v)) {
+    for (uint32_t v = table.first(key); v != kNoIndex && target == kNoIndex; v = table.next(v)) {
       if (result.positions[v] == positions[vertex]) target = v;
     }
-    if (target != kNone) continue;
+    if (target != kNoIndex) continue;
     target = static_cast<uint32_t>(result.positions.size());
     result.positions.push_back(positions[vertex]);
     table.insert(key, target);
@@ -98,7 +97,7 @@ class NearWelder {
       for (int64_t y = lower.y; y <= upper.y; ++y) {
         for (int64_t x = lower.x; x <= upper.x; ++x) {
           const uint32_t found = find(vertex, cell_key({x, y, z}));
-          if (found != kNone) return found;
+          if (found != kNoIndex) return found;
         }
       }
     }
@@ -111,11 +110,11 @@ class NearWelder {
 
   uint32_t find(uint32_t vertex, uint64_t key) const {
     int seen = 0;
-    for (uint32_t v = table_.first(key); v != kNone && seen < kMaxPerCell; v = table_.next(v), ++seen) {
+    for (uint32_t v = table_.first(key); v != kNoIndex && seen < kMaxPerCell; v = table_.next(v), ++seen) {
       const float distance = glm::length(positions_[v] - positions_[vertex]);
       if (distance <= std::min(tolerance_[v], tolerance_[vertex])) return v;
     }
-    return kNone;
+    return kNoIndex;
   }
 
   const std::vector<vec3>& positions_;
@@ -149,7 +148,7 @@ WeldResult weld(std::span<const vec3> positions, std::span<const uint32_t> face_
     }
   }
   if (result.near_welds == 0) return result;
-  for (uint32_t& v : result.vertex_of) v = v == kNone ? kNone : merged[v];
+  for (uint32_t& v : result.vertex_of) v = v == kNoIndex ? kNoIndex : merged[v];
   result.positions = std::move(kept);
   return result;
 }

@@ -6,12 +6,13 @@
 #include <span>
 #include <vector>
 
+#include "base/index.h"
 #include "base/vec.h"
 
 namespace farfield {
 
 struct WeldResult {
-  std::vector<uint32_t> vertex_of;  ///< for each input vertex its output vertex; UINT32_MAX where no face uses it
+  std::vector<uint32_t> vertex_of;  ///< for each input vertex its output vertex; kNoIndex where no face uses it
   std::vector<vec3> positions;      ///< of the output vertices, in order of first use
   size_t near_welds = 0;            ///< how many were joined although their positions differ
 };

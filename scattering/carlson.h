@@ -11,7 +11,4 @@ double carlson_rg(double x, double y, double z);
 /// The same to float precision, relative error below 1e-6.
 float carlson_rg(float x, float y, float z);
 
-/// The same in float from four elementary terms, relative error below 7e-4; no special cases, R_G(0, 0, 0) = 0.
-float carlson_rg_fast(float x, float y, float z);
-
 }  // namespace farfield

@@ -10,8 +10,9 @@
 
 #include "scattering/carlson.h"
 #include "scattering/flake_phase.h"
-#include "scattering/lobe_fit.h"
-#include "scattering/microflake_medium.h"
+#include "scattering/media/carlson_fast.h"
+#include "scattering/media/lobe_fit.h"
+#include "scattering/media/microflake_medium.h"
 #include "scattering/sggx_codec.h"
 #include "scattering/surface_bsdf.h"
 

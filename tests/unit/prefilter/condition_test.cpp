@@ -109,6 +109,20 @@ TEST(ImportObj, TexturesAreFoundAveragedAndTheRightWayUp) {
   for (const FaceMaterial& m : asset->surface.materials) expect_near(m.diffuse, vec3(1, 0, 0), 1e-4f);
 }
 
+TEST(ImportObj, CuttingMasksStopsWhenAsked) {
+  const TemporaryFolder folder;
+  folder.write("mask.png", png(2, 1, {{255, 255, 255, 255}, {0, 0, 0, 0}}));
+  folder.write("m.mtl", "newmtl a\nmap_d mask.png\n");
+  const std::string obj = std::string("mtllib m.mtl\nusemtl a\n") + kQuadObj + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+  const fs::path path = folder.write("a.obj", obj + "f 1/1 2/2 3/3 4/4\n");
+  std::atomic<bool> cancel{false};
+  EXPECT_TRUE(import_asset(path, {}, {{}, &cancel}));
+  cancel = true;
+  const auto asset = import_asset(path, {}, {{}, &cancel});
+  ASSERT_FALSE(asset);
+  EXPECT_EQ(asset.error().code, ErrorCode::Cancelled);
+}
+
 TEST(ImportObj, DissolveMapCutsTheFace) {
   const TemporaryFolder folder;
   std::vector<std::array<uint8_t, 4>> texels(64 * 64, {0, 0, 0, 255});

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scattering/microflake_medium.h"
+#include "scattering/media/microflake_medium.h"
 
 #include <gtest/gtest.h>
 
 #include "scattering/carlson.h"
-#include "scattering/lobe_fit.h"
+#include "scattering/media/lobe_fit.h"
 #include "tests/support/statistics.h"
 
 namespace farfield {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scattering/lobe_fit.h"
+#include "scattering/media/lobe_fit.h"
 
 #include <gtest/gtest.h>
 

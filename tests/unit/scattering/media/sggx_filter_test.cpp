@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scattering/sggx_filter.h"
+#include "scattering/media/sggx_filter.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scattering/trig_lobe.h"
+#include "scattering/media/trig_lobe.h"
 
 #include <gtest/gtest.h>
 

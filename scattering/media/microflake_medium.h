@@ -21,8 +21,8 @@
 #pragma once
 
 #include "farfield/scatter_sample.h"
+#include "scattering/media/trig_lobe.h"
 #include "scattering/sggx.h"
-#include "scattering/trig_lobe.h"
 
 namespace farfield {
 

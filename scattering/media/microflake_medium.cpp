@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scattering/microflake_medium.h"
+#include "scattering/media/microflake_medium.h"
 
 #include "scattering/carlson.h"
 

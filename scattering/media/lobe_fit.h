@@ -2,7 +2,7 @@
 // From an SGGX distribution to a mixture of trigonometric lobes with the same attenuation in every direction.
 #pragma once
 
-#include "scattering/trig_lobe.h"
+#include "scattering/media/trig_lobe.h"
 
 namespace farfield {
 
