@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bvh/bvh_device.h"
 
-#include <fmt/format.h>
 #include <tbb/global_control.h>
 
-#include <string>
 #include <thread>
+#include <utility>
 
 namespace farfield {
 
@@ -21,21 +20,12 @@ bool BvhDevice::on_memory(void* self, ssize_t bytes, bool /*post*/) {
 Result<std::unique_ptr<BvhDevice>> BvhDevice::create() {
   // Embree installs a TBB limit of the largest "threads" among live devices, and none at all if one has the default.
   const size_t limit = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
-  const bool limited = limit < std::thread::hardware_concurrency();
-  const std::string config = limited ? fmt::format("threads={}", limit) : std::string();
+  const bool is_limited = limit < std::thread::hardware_concurrency();
 
   std::unique_ptr<BvhDevice> device(new BvhDevice);
-  device->device_ = rtcNewDevice(config.c_str());
-  if (!device->device_) {
-    return make_error(ErrorCode::Unsupported, fmt::format("Embree does not start on this machine (error {})",
-                                                          static_cast<int>(rtcGetDeviceError(nullptr))));
-  }
-  rtcSetDeviceMemoryMonitorFunction(device->device_, on_memory, device.get());
+  FARFIELD_TRY_LET(device->device_, make_embree_device(is_limited ? static_cast<int>(limit) : 0));
+  set_memory_monitor(device->handle(), on_memory, device.get());
   return device;
-}
-
-BvhDevice::~BvhDevice() {
-  if (device_) rtcReleaseDevice(device_);
 }
 
 }  // namespace farfield

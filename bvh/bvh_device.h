@@ -2,13 +2,12 @@
 // Our own Embree device, which counts every byte that Embree holds for levels.
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
 
+#include "base/embree.h"
 #include "base/result.h"
 
 namespace farfield {
@@ -20,11 +19,10 @@ class BvhDevice {
   /// Keeps the number of TBB threads that the process is limited to now: a default device would lift the limit.
   /// Errors: Unsupported (Embree does not start).
   static Result<std::unique_ptr<BvhDevice>> create();
-  ~BvhDevice();
   BvhDevice(const BvhDevice&) = delete;
   BvhDevice& operator=(const BvhDevice&) = delete;
 
-  RTCDevice handle() const { return device_; }
+  EmbreeDeviceRef handle() const { return device_.get(); }
   std::mutex& build_mutex() { return build_mutex_; }
 
   /// Bytes that Embree has reported for this device and not given back.
@@ -37,11 +35,11 @@ class BvhDevice {
   BvhDevice() = default;
   static bool on_memory(void* self, ssize_t bytes, bool post);
 
-  RTCDevice device_ = nullptr;
   std::mutex build_mutex_;
   // relaxed: only counters; whoever compares them holds build_mutex_ and has joined the build's threads.
   std::atomic<int64_t> bytes_{0};
   std::atomic<int64_t> peak_bytes_{0};
+  EmbreeDevice device_;  // last, so released first: what it gives back is still counted
 };
 
 }  // namespace farfield

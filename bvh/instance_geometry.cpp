@@ -2,7 +2,8 @@
 // The callbacks, and what Embree 3.13 demands of them:
 //
 // * Single rays (N == 1) are transformed in place and traced with the caller's own context: args->rayhit is the
-//   caller's RTCRayHit, and a fresh context would lose the host's RayContext. Within packets (N > 1) rays are copies.
+//   caller's EmbreeRayHit, and a fresh context would lose the host's RayContext. Within packets (N > 1) rays are
+//   copies.
 // * The direction is not normalised, so t means the same inside and outside and tnear/tfar need no change.
 // * A nested hit writes the nested scene's ids, and may do so without shrinking tfar (equal distances). So geomID is
 //   set aside before the nested call, and what it is afterwards tells whether there was a hit.
@@ -33,13 +34,14 @@ constexpr float kRangePad = 1e-6f;
 // The largest coordinate that Embree takes: see is_traceable().
 constexpr float kEmbreeLargest = 1.8e18f;
 
-vec3 origin_of(const RTCRay& ray) { return {ray.org_x, ray.org_y, ray.org_z}; }
-vec3 direction_of(const RTCRay& ray) { return {ray.dir_x, ray.dir_y, ray.dir_z}; }
+vec3 origin_of(const EmbreeRay& ray) { return {ray.org_x, ray.org_y, ray.org_z}; }
+vec3 direction_of(const EmbreeRay& ray) { return {ray.dir_x, ray.dir_y, ray.dir_z}; }
 
 /// Puts a ray into local space, and back at the end of the scope. Lanes 3 (tnear, time) stay as they are.
 class InLocalSpace {
  public:
-  InLocalSpace(RTCRay& ray, const LocalRay& local) : ray_(ray), origin_(origin_of(ray)), direction_(direction_of(ray)) {
+  InLocalSpace(EmbreeRay& ray, const LocalRay& local)
+      : ray_(ray), origin_(origin_of(ray)), direction_(direction_of(ray)) {
     set(local.origin, local.direction);
   }
   ~InLocalSpace() { set(origin_, direction_); }
@@ -51,17 +53,15 @@ class InLocalSpace {
     ray_.org_x = origin.x, ray_.org_y = origin.y, ray_.org_z = origin.z;
     ray_.dir_x = direction.x, ray_.dir_y = direction.y, ray_.dir_z = direction.z;
   }
-  RTCRay& ray_;
+  EmbreeRay& ray_;
   vec3 origin_;
   vec3 direction_;
 };
 
-/// rtcIntersect1 that says whether it found something, and leaves the outer hit's ids alone if not.
-bool intersect_surface(RTCScene scene, RTCIntersectContext* context, RTCRayHit& ray_hit) {
+/// trace_nearest that leaves the outer hit's ids alone if it finds nothing.
+bool intersect_surface(EmbreeSceneRef scene, EmbreeContext& context, EmbreeRayHit& ray_hit) {
   const unsigned outer_id = ray_hit.hit.geomID;
-  ray_hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(scene, context, &ray_hit);
-  if (ray_hit.hit.geomID != RTC_INVALID_GEOMETRY_ID) return true;
+  if (trace_nearest(scene, context, ray_hit)) return true;
   ray_hit.hit.geomID = outer_id;
   return false;
 }
@@ -154,7 +154,7 @@ struct InstanceGeometry::Visit {
 };
 
 /// Fills in `visit`. False: the ray passes by.
-bool InstanceGeometry::enter(uint32_t instance, const RTCRay& ray, const RayContext& context, Visit& visit) const {
+bool InstanceGeometry::enter(uint32_t instance, const EmbreeRay& ray, const RayContext& context, Visit& visit) const {
   const InstanceRecord& record = instances[instance];
   const TracedAsset& asset = *assets[record.asset];
   visit.ray = {record.point_to_local(origin_of(ray)), record.vector_to_local(direction_of(ray)), ray.tnear, ray.tfar};
@@ -168,17 +168,17 @@ bool InstanceGeometry::enter(uint32_t instance, const RTCRay& ray, const RayCont
   return visit.level != nullptr;
 }
 
-bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, RTCRayHit& ray_hit, const RayContext& context,
-                                 RTCIntersectContext* embree_context, HitRecord* record) const {
+bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, EmbreeRayHit& ray_hit,
+                                 const RayContext& context, EmbreeContext* embree_context, HitRecord* record) const {
   Visit visit;
   if (!enter(instance, ray_hit.ray, context, visit)) return false;
-  RTCRay& ray = ray_hit.ray;
+  EmbreeRay& ray = ray_hit.ray;
   RTCHit& hit = ray_hit.hit;
 
   bool on_surface = false;
   if (visit.level->scene.handle()) {
     const InLocalSpace scope(ray, visit.ray);
-    on_surface = intersect_surface(visit.level->scene.handle(), embree_context, ray_hit);
+    on_surface = intersect_surface(visit.level->scene.handle(), *embree_context, ray_hit);
   }
   std::optional<VolumeHit> collision;
   if (!visit.level->volume.is_empty()) {
@@ -213,14 +213,13 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, RTCRay
   return true;
 }
 
-bool InstanceGeometry::occluded(uint32_t instance, RTCRay& ray, const RayContext& context,
-                                RTCIntersectContext* embree_context) const {
+bool InstanceGeometry::occluded(uint32_t instance, EmbreeRay& ray, const RayContext& context,
+                                EmbreeContext* embree_context) const {
   Visit visit;
   if (!enter(instance, ray, context, visit)) return false;
   if (visit.level->scene.handle()) {
     const InLocalSpace scope(ray, visit.ray);
-    rtcOccluded1(visit.level->scene.handle(), embree_context, &ray);
-    if (ray.tfar < 0.0f) return true;
+    if (trace_occlusion(visit.level->scene.handle(), *embree_context, ray)) return true;
   }
   const BrickVolume& volume = visit.level->volume;
   if (volume.is_empty() || !volume.first_collision(visit.ray, flight_seed(context, instance))) return false;
@@ -244,7 +243,7 @@ void InstanceGeometry::intersect_callback(const RTCIntersectFunctionNArguments* 
   auto& context = *reinterpret_cast<RayContext*>(args->context);
   if (args->N == 1) {
     if (args->valid[0] == 0) return;
-    auto& ray_hit = *reinterpret_cast<RTCRayHit*>(args->rayhit);
+    auto& ray_hit = *reinterpret_cast<EmbreeRayHit*>(args->rayhit);
     self.intersect(args->primID, args->geomID, ray_hit, context, args->context, &context.hit);
     return;
   }
@@ -252,9 +251,9 @@ void InstanceGeometry::intersect_callback(const RTCIntersectFunctionNArguments* 
   RTCHitN* hits = RTCRayHitN_HitN(args->rayhit, args->N);
   for (unsigned lane = 0; lane < args->N; ++lane) {
     if (args->valid[lane] == 0) continue;
-    RTCRayHit ray_hit;
+    EmbreeRayHit ray_hit;
     ray_hit.ray = rtcGetRayFromRayN(rays, args->N, lane);
-    ray_hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    ray_hit.hit.geomID = kNoGeometry;
     ray_hit.hit.instID[0] = args->context->instID[0];
     if (!self.intersect(args->primID, args->geomID, ray_hit, context, args->context, nullptr)) continue;
     RTCRayN_tfar(rays, args->N, lane) = ray_hit.ray.tfar;
@@ -267,29 +266,29 @@ void InstanceGeometry::occluded_callback(const RTCOccludedFunctionNArguments* ar
   const auto& context = *reinterpret_cast<const RayContext*>(args->context);
   if (args->N == 1) {
     if (args->valid[0] == 0) return;
-    self.occluded(args->primID, *reinterpret_cast<RTCRay*>(args->ray), context, args->context);
+    self.occluded(args->primID, *reinterpret_cast<EmbreeRay*>(args->ray), context, args->context);
     return;
   }
   for (unsigned lane = 0; lane < args->N; ++lane) {
     if (args->valid[lane] == 0) continue;
-    RTCRay ray = rtcGetRayFromRayN(args->ray, args->N, lane);
+    EmbreeRay ray = rtcGetRayFromRayN(args->ray, args->N, lane);
     if (self.occluded(args->primID, ray, context, args->context)) RTCRayN_tfar(args->ray, args->N, lane) = -kInfinity;
   }
 }
 
-RTCGeometry InstanceGeometry::create(RTCDevice device) {
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
-  rtcSetGeometryUserData(geometry, this);
-  rtcSetGeometryBoundsFunction(geometry, bounds_callback, nullptr);
-  rtcSetGeometryIntersectFunction(geometry, intersect_callback);
-  rtcSetGeometryOccludedFunction(geometry, occluded_callback);
-  update(geometry);
+EmbreeGeometry InstanceGeometry::create(EmbreeDeviceRef device) {
+  EmbreeGeometry geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER));
+  rtcSetGeometryUserData(geometry.get(), this);
+  rtcSetGeometryBoundsFunction(geometry.get(), bounds_callback, nullptr);
+  rtcSetGeometryIntersectFunction(geometry.get(), intersect_callback);
+  rtcSetGeometryOccludedFunction(geometry.get(), occluded_callback);
+  update(geometry.get());
   return geometry;
 }
 
-void InstanceGeometry::update(RTCGeometry geometry) {
+void InstanceGeometry::update(EmbreeGeometryRef geometry) {
   rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(instances.size()));
-  rtcCommitGeometry(geometry);
+  commit_geometry(geometry);
 }
 
 }  // namespace farfield

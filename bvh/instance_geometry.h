@@ -2,13 +2,12 @@
 // All instances of all assets as one Embree user geometry: primitive = instance (docs/architecture.md, decision 1).
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
+#include "base/embree.h"
 #include "base/result.h"
 #include "base/vec.h"
 #include "bvh/level_choice.h"
@@ -57,11 +56,11 @@ class InstanceGeometry {
   std::vector<const TracedAsset*> assets;  ///< InstanceRecord::asset indexes it
   std::optional<float> forced_lambda;
 
-  /// A new user geometry over all instances, committed; the caller owns it. Refers to this object. Call update() after
+  /// A new user geometry over all instances, committed. Refers to this object. Call update() after
   /// instances were added or moved.
-  RTCGeometry create(RTCDevice device);
+  EmbreeGeometry create(EmbreeDeviceRef device);
   /// Tells Embree about the instances as they are now; the scene needs a commit too.
-  void update(RTCGeometry geometry);
+  void update(EmbreeGeometryRef geometry);
 
  private:
   static void bounds_callback(const RTCBoundsFunctionArguments* args);
@@ -69,10 +68,10 @@ class InstanceGeometry {
   static void occluded_callback(const RTCOccludedFunctionNArguments* args);
 
   struct Visit;
-  bool enter(uint32_t instance, const RTCRay& ray, const RayContext& context, Visit& visit) const;
-  bool intersect(uint32_t instance, unsigned geometry_id, RTCRayHit& ray_hit, const RayContext& context,
-                 RTCIntersectContext* embree_context, HitRecord* record) const;
-  bool occluded(uint32_t instance, RTCRay& ray, const RayContext& context, RTCIntersectContext* embree_context) const;
+  bool enter(uint32_t instance, const EmbreeRay& ray, const RayContext& context, Visit& visit) const;
+  bool intersect(uint32_t instance, unsigned geometry_id, EmbreeRayHit& ray_hit, const RayContext& context,
+                 EmbreeContext* embree_context, HitRecord* record) const;
+  bool occluded(uint32_t instance, EmbreeRay& ray, const RayContext& context, EmbreeContext* embree_context) const;
 
   LevelSource& source_;
 };

@@ -4,34 +4,14 @@
 #include "bvh/level_scene.h"
 
 #include <fmt/format.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <utility>
 #include <vector>
 
 #include "base/result.h"
 #include "cache/level_file.h"
 
 namespace farfield {
-
-namespace {
-
-template <typename T>
-void share_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::span<const T> array) {
-  rtcSetSharedGeometryBuffer(geometry, type, 0, format, array.data(), 0, sizeof(T), array.size());
-}
-
-RTCGeometry make_quad_geometry(RTCDevice device, const LevelView& level) {
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_QUAD);
-  share_buffer(geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, level.positions);
-  share_buffer(geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT4, level.quads);
-  rtcSetGeometryMask(geometry, 0xffffffffu);  // the mask of the user geometry around it decides
-  rtcCommitGeometry(geometry);
-  return geometry;
-}
-
-}  // namespace
 
 Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level) {
   LevelScene result;
@@ -40,39 +20,18 @@ Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level) 
   const std::lock_guard lock(device.build_mutex());
   const uint64_t bytes_before = device.bytes();
   device.reset_peak();
-  rtcGetDeviceError(device.handle());  // forget what is not ours
+  forget_embree_error(device.handle());  // not ours
 
-  RTCGeometry geometry = make_quad_geometry(device.handle(), level);
-  result.scene_ = rtcNewScene(device.handle());
-  rtcSetSceneBuildQuality(result.scene_, RTC_BUILD_QUALITY_MEDIUM);
-  rtcAttachGeometryByID(result.scene_, geometry, 0);
-  rtcReleaseGeometry(geometry);
-  // An arena of one: a render thread that waits in here must not run a foreign task, and the bytes stay the same.
-  tbb::task_arena(1).execute([&] { rtcCommitScene(result.scene_); });
+  const EmbreeGeometry quads = new_quads(device.handle());
+  share_array(quads.get(), level.positions);
+  share_array(quads.get(), level.quads);
+  result.scene_ = build_static_scene(device.handle(), quads.get());
+  FARFIELD_TRY(check_embree(device.handle(), fmt::format("build a BVH of {} quads", level.quads.size())));
 
-  const RTCError error = rtcGetDeviceError(device.handle());
-  if (error != RTC_ERROR_NONE) {
-    return make_error(ErrorCode::Io,
-                      fmt::format("Embree cannot build a BVH of {} quads (error {}{})", level.quads.size(),
-                                  static_cast<int>(error), error == RTC_ERROR_OUT_OF_MEMORY ? ": out of memory" : ""));
-  }
   const uint64_t bytes_after = device.bytes();
   result.bytes_ = bytes_after - std::min(bytes_before, bytes_after) + kSceneOverheadBytes + kGeometryOverheadBytes;
   result.build_peak_bytes_ = device.peak_bytes() - bytes_after;
   return result;
-}
-
-LevelScene::~LevelScene() {
-  if (scene_) rtcReleaseScene(scene_);
-}
-
-LevelScene::LevelScene(LevelScene&& other) noexcept { *this = std::move(other); }
-
-LevelScene& LevelScene::operator=(LevelScene&& other) noexcept {
-  std::swap(scene_, other.scene_);
-  std::swap(bytes_, other.bytes_);
-  std::swap(build_peak_bytes_, other.build_peak_bytes_);
-  return *this;
 }
 
 LevelCost level_cost(const LevelView& level, const LevelScene& scene) {

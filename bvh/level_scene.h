@@ -2,10 +2,9 @@
 // The BVH of a level's surface: a static Embree scene of quads over the level's own arrays.
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <cstdint>
 
+#include "base/embree.h"
 #include "base/result.h"
 #include "bvh/bvh_device.h"
 #include "cache/level.h"
@@ -26,18 +25,15 @@ class LevelScene {
   /// last position must be readable (level files see to that), because Embree loads vertices 16 bytes at a time.
   /// Holds device.build_mutex(). Errors: Io (out of memory, or what else Embree says).
   static Result<LevelScene> build(BvhDevice& device, const LevelView& level);
-  ~LevelScene();
-  LevelScene(LevelScene&& other) noexcept;
-  LevelScene& operator=(LevelScene&& other) noexcept;
 
-  RTCScene handle() const { return scene_; }  ///< null without a surface
+  EmbreeSceneRef handle() const { return scene_.get(); }  ///< null without a surface
   /// Bytes that the BVH holds, overheads included.
   uint64_t bytes() const { return bytes_; }
   /// Bytes that the build needed at its peak beyond bytes().
   uint64_t build_peak_bytes() const { return build_peak_bytes_; }
 
  private:
-  RTCScene scene_ = nullptr;
+  EmbreeScene scene_;
   uint64_t bytes_ = 0;
   uint64_t build_peak_bytes_ = 0;
 };

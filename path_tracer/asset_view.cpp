@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "path_tracer/asset_view.h"
 
+#include "base/embree.h"
+#include "base/parallel.h"
 #include "base/result.h"
 #include "path_tracer/camera.h"
-#include "path_tracer/embree_handles.h"
 
 namespace farfield {
 
 struct AssetView::Impl {
-  DeviceHandle device;  // first: everything else lives on it
+  EmbreeDevice device;  // first: everything else lives on it
   std::unique_ptr<Runtime> runtime;
-  SceneHandle scene;
+  EmbreeScene scene;
   AssetId asset{0};
 };
 
@@ -21,8 +22,7 @@ Result<std::unique_ptr<AssetView>> AssetView::open(const std::filesystem::path& 
                                                    uint64_t budget_bytes) {
   std::unique_ptr<AssetView> view(new AssetView);
   Impl& impl = *view->impl_;
-  FARFIELD_TRY_LET(auto device, make_device());
-  impl.device = std::move(device);
+  FARFIELD_TRY_LET(impl.device, make_embree_device(thread_count()));  // as many threads as parallel_for uses
 
   RuntimeOptions options;
   options.budget_bytes = budget_bytes;
@@ -35,7 +35,7 @@ Result<std::unique_ptr<AssetView>> AssetView::open(const std::filesystem::path& 
   FARFIELD_TRY(impl.runtime->add_instance(asset, mat4x3(1.0f)));
   FARFIELD_TRY(impl.runtime->plan_frame());
 
-  FARFIELD_TRY_LET(auto scene, make_scene(impl.device, *impl.runtime));
+  FARFIELD_TRY_LET(auto scene, make_scene(impl.device.get(), *impl.runtime));
   impl.scene = std::move(scene);
   return view;
 }

@@ -2,8 +2,6 @@
 // One baked asset alone, at a level of choice, seen by an orthographic camera: what `farfield evaluate` compares.
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <atomic>
 #include <cstdint>
 #include <filesystem>

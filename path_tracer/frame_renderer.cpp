@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <optional>
 
+#include "base/embree.h"
 #include "base/file_io.h"
 #include "base/hash.h"
+#include "base/parallel.h"
 #include "base/result.h"
 #include "path_tracer/asset_library.h"
 #include "path_tracer/film.h"
@@ -112,8 +114,9 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOption
 Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const FrameSink& sink) {
   // Everything of ours first, assets last: see warm_up.h.
   Film film(options_.width, options_.height);
-  FARFIELD_TRY_LET(auto device, make_device());
-  FARFIELD_TRY(warm_up(device, film.image()));
+  // As many threads as parallel_for uses: a default device would lift a limit on them.
+  FARFIELD_TRY_LET(auto device, make_embree_device(thread_count()));
+  FARFIELD_TRY(warm_up(device.get(), film.image()));
 
   RenderReport report;
   report.assets = asset_names_;
@@ -128,7 +131,7 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     std::vector<GltfInstance> instances = scene_.instances_at(seconds);
     if (!session || !same_places(instances, session_instances)) {
       session.reset();  // before the next one, so that two never share the budget
-      FARFIELD_TRY_LET(auto opened, RenderSession::open(device, options_, asset_folders_, instances));
+      FARFIELD_TRY_LET(auto opened, RenderSession::open(device.get(), options_, asset_folders_, instances));
       session = std::move(opened);
       session_instances = std::move(instances);
     }

@@ -68,24 +68,9 @@ class PathTracer {
   vec3 throughput_{1.0f};
   vec3 color_{0.0f};
   HitRecord last_hit_;  ///< what the present ray leaves; instance kNoInstance for the camera
-  RayContext context_;  ///< of the last rtcIntersect1
-  RTCRayHit ray_hit_{};
+  RayContext context_;  ///< of the last intersect()
+  EmbreeRayHit ray_hit_{};
 };
-
-void set_ray(RTCRay& to, const PathRay& ray, float distance) {
-  to.org_x = ray.origin.x;
-  to.org_y = ray.origin.y;
-  to.org_z = ray.origin.z;
-  to.tnear = 0;
-  to.dir_x = ray.direction.x;
-  to.dir_y = ray.direction.y;
-  to.dir_z = ray.direction.z;
-  to.time = 0;
-  to.tfar = distance;
-  to.mask = 0xffffffffu;
-  to.id = 0;
-  to.flags = 0;
-}
 
 void PathTracer::set_context(RayContext& context, const PathRay& ray) {
   context = RayContext();
@@ -98,22 +83,18 @@ void PathTracer::set_context(RayContext& context, const PathRay& ray) {
 
 bool PathTracer::intersect(const PathRay& ray) {
   set_context(context_, ray);
-  set_ray(ray_hit_.ray, ray, kInfinity);
-  ray_hit_.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  ray_hit_.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(scene_.embree, &context_.embree, &ray_hit_);
+  ray_hit_ = make_ray_hit(ray.origin, ray.direction);
   ++stats.rays;
-  return ray_hit_.hit.geomID != RTC_INVALID_GEOMETRY_ID && ray_hit_.hit.geomID == scene_.runtime->geometry_id();
+  return trace_nearest(scene_.embree, context_.embree, ray_hit_) &&
+         ray_hit_.hit.geomID == scene_.runtime->geometry_id();
 }
 
 bool PathTracer::is_occluded(const PathRay& ray, float distance) {
   RayContext context;
   set_context(context, ray);
-  RTCRay shadow_ray;
-  set_ray(shadow_ray, ray, distance);
-  rtcOccluded1(scene_.embree, &context.embree, &shadow_ray);
+  EmbreeRay shadow_ray = make_ray(ray.origin, ray.direction, 0, distance);
   ++stats.rays;
-  return shadow_ray.tfar < 0;
+  return trace_occlusion(scene_.embree, context.embree, shadow_ray);
 }
 
 // The ray from a vertex into sample.wi. Its cone starts as wide as the incoming one is there.
@@ -280,6 +261,14 @@ float spot_falloff(const PointLight& light, const vec3& direction) {
   if (cosine <= light.cos_outer) return 0;
   const float t = (cosine - light.cos_outer) / (light.cos_inner - light.cos_outer);
   return t * t;  // as KHR_lights_punctual recommends
+}
+
+Result<EmbreeScene> make_scene(EmbreeDeviceRef device, Runtime& runtime) {
+  EmbreeScene scene = new_scene(device);
+  FARFIELD_TRY(runtime.attach(scene.get()));
+  commit_scene(scene.get());
+  FARFIELD_TRY(check_embree(device, "build the scene"));
+  return scene;
 }
 
 Result<TraceStats> path_trace(const TraceScene& scene, const Camera& camera, const TraceOptions& options, Film& film,

@@ -2,11 +2,10 @@
 // A path tracer over Farfield geometry: the loop that a host would write.
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <cstdint>
 #include <vector>
 
+#include "base/embree.h"
 #include "base/job.h"
 #include "base/result.h"
 #include "farfield/runtime.h"
@@ -35,7 +34,7 @@ struct Lights {
 
 /// What a path meets. `embree` is committed and holds the runtime's user geometry.
 struct TraceScene {
-  RTCScene embree = nullptr;
+  EmbreeSceneRef embree = nullptr;
   const Runtime* runtime = nullptr;
   const Lights* lights = nullptr;
 };
@@ -61,6 +60,9 @@ struct TraceStats {
   uint64_t rays = 0;             ///< camera, scattered and shadow rays
   uint64_t invalid_samples = 0;  ///< paths whose value was not finite; they count as black
 };
+
+/// A committed scene that holds the runtime's geometry and nothing else. Errors: those of Runtime::attach, Io (Embree).
+Result<EmbreeScene> make_scene(EmbreeDeviceRef device, Runtime& runtime);
 
 /// Renders `camera` into `film` (same size) on all threads of parallel_for. The image depends on the arguments alone,
 /// not on threads or time. The job reports from several threads at once and is polled for each tile of 16 x 16 pixels.

@@ -26,11 +26,11 @@ RuntimeOptions runtime_options(const RenderOptions& options) {
 
 }  // namespace
 
-Result<std::unique_ptr<RenderSession>> RenderSession::open(const DeviceHandle& device, const RenderOptions& options,
+Result<std::unique_ptr<RenderSession>> RenderSession::open(EmbreeDeviceRef device, const RenderOptions& options,
                                                            std::span<const std::filesystem::path> folders,
                                                            std::span<const GltfInstance> instances) {
   std::unique_ptr<RenderSession> session(new RenderSession);
-  FARFIELD_TRY_LET(auto runtime, Runtime::create(device.get(), runtime_options(options)));
+  FARFIELD_TRY_LET(auto runtime, Runtime::create(device, runtime_options(options)));
   session->runtime_ = std::move(runtime);
 
   std::vector<AssetId> assets(folders.size());

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "base/embree.h"
 #include "base/result.h"
 #include "import/gltf_scene.h"
-#include "path_tracer/embree_handles.h"
 #include "path_tracer/film.h"
 #include "path_tracer/render_job.h"
 
@@ -20,7 +20,7 @@ class RenderSession {
  public:
   /// folders: per mesh, as find_or_bake_assets gives them; instances of meshes without one are left out. The device
   /// outlives the session. Errors: those of Runtime.
-  static Result<std::unique_ptr<RenderSession>> open(const DeviceHandle& device, const RenderOptions& options,
+  static Result<std::unique_ptr<RenderSession>> open(EmbreeDeviceRef device, const RenderOptions& options,
                                                      std::span<const std::filesystem::path> folders,
                                                      std::span<const GltfInstance> instances);
 
@@ -34,7 +34,7 @@ class RenderSession {
  private:
   RenderSession() = default;
   std::unique_ptr<Runtime> runtime_;
-  SceneHandle scene_;
+  EmbreeScene scene_;
 };
 
 }  // namespace farfield

@@ -109,10 +109,10 @@ Result<void> write_warm_up_asset(const fs::path& folder) {
 }
 
 // Both levels, seen from near and from far, under a light with a disc.
-Result<void> trace_warm_up_asset(const DeviceHandle& device, const fs::path& folder) {
+Result<void> trace_warm_up_asset(EmbreeDeviceRef device, const fs::path& folder) {
   RuntimeOptions options;
   options.budget_bytes = kBudget;
-  FARFIELD_TRY_LET(auto runtime, Runtime::create(device.get(), options));
+  FARFIELD_TRY_LET(auto runtime, Runtime::create(device, options));
   FARFIELD_TRY_LET(const auto asset, runtime->open_asset(folder.string()));
   FARFIELD_TRY(runtime->add_instance(asset, mat4x3(1.0f)));
   FARFIELD_TRY_LET(const auto scene, make_scene(device, *runtime));
@@ -142,7 +142,7 @@ Result<void> write_images(const fs::path& folder, const Image& frame) {
 
 }  // namespace
 
-Result<void> warm_up(const DeviceHandle& device, const Image& frame) {
+Result<void> warm_up(EmbreeDeviceRef device, const Image& frame) {
   FARFIELD_TRY_LET(auto folder, TemporaryFolder::create());
   FARFIELD_TRY(write_warm_up_asset(folder.path()));
   FARFIELD_TRY(trace_warm_up_asset(device, folder.path()));

@@ -6,8 +6,8 @@
 // would count as assets if they came later: here they all come first.
 #pragma once
 
+#include "base/embree.h"
 #include "base/result.h"
-#include "path_tracer/embree_handles.h"
 #include "path_tracer/image.h"
 
 namespace farfield {
@@ -15,6 +15,6 @@ namespace farfield {
 /// Renders a tiny asset of its own through a throw-away Runtime on all threads, writes `frame` (the film that later
 /// frames use) as EXR and PNG to the temporary folder, and gives free memory back to the system but for what the
 /// writers use. Nothing stays on disk. Errors: Io (no temporary folder), those of Runtime.
-Result<void> warm_up(const DeviceHandle& device, const Image& frame);
+Result<void> warm_up(EmbreeDeviceRef device, const Image& frame);
 
 }  // namespace farfield

@@ -2,12 +2,10 @@
 // Triangles to cast rays at.
 #pragma once
 
-#include <embree3/rtcore.h>
-
-#include <memory>
 #include <optional>
-#include <type_traits>
 
+#include "base/embree.h"
+#include "base/result.h"
 #include "base/vec.h"
 #include "prefilter/surface.h"
 
@@ -23,25 +21,18 @@ struct RayHit {
 /// does not depend on the number of threads. Rays may be cast from any thread; directions are unit.
 class RayScene {
  public:
-  /// Errors: see is_valid().
-  explicit RayScene(const Surface& geometry);
-  /// Whether Embree could build the scene (it had the memory).
-  bool is_valid() const;
+  /// Errors: Unsupported (Embree does not start), Io (out of memory, or what else Embree says).
+  static Result<RayScene> build(const Surface& geometry);
 
   std::optional<RayHit> first_hit(const vec3& origin, const vec3& direction, float length) const;
   /// Whether anything is in the way between these distances.
   bool is_occluded(const vec3& origin, const vec3& direction, float near, float far) const;
 
  private:
-  struct DeleteDevice {
-    void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-  };
-  struct DeleteScene {
-    void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-  };
+  RayScene() = default;
 
-  std::unique_ptr<std::remove_pointer_t<RTCDevice>, DeleteDevice> device_;
-  std::unique_ptr<std::remove_pointer_t<RTCScene>, DeleteScene> scene_;
+  EmbreeDevice device_;  // first: the scene lives on it
+  EmbreeScene scene_;
 };
 
 }  // namespace farfield

@@ -260,10 +260,7 @@ Result<std::vector<std::vector<Voxel>>> measure_bricks(const Surface& geometry, 
                                                        const VoxelizeOptions& options) {
   std::vector<std::vector<Voxel>> voxels(candidates.coordinates.size());
   if (voxels.empty()) return voxels;
-  const RayScene rays(geometry);
-  if (!rays.is_valid()) {
-    return make_error(ErrorCode::Io, "voxelize: Embree could not build the geometry (out of memory?)");
-  }
+  FARFIELD_TRY_LET(const RayScene rays, RayScene::build(geometry));
   const Measurement measurement{geometry, lattice, rays, rays_per_voxel(candidates.size(), options), options.seed};
   const size_t first = std::min<uint64_t>(options.bricks.first, voxels.size());
   const size_t last = first + std::min<uint64_t>(options.bricks.count, voxels.size() - first);

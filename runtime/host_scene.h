@@ -2,6 +2,7 @@
 // The host's Embree scene, and our one geometry in it.
 #pragma once
 
+#include "base/embree.h"
 #include "base/result.h"
 #include "bvh/instance_geometry.h"
 
@@ -11,20 +12,19 @@ namespace farfield {
 class HostScene {
  public:
   /// The device is retained.
-  explicit HostScene(RTCDevice device);
-  ~HostScene();
+  explicit HostScene(EmbreeDeviceRef device) : device_(retain(device)) {}
   HostScene(const HostScene&) = delete;
   HostScene& operator=(const HostScene&) = delete;
 
   /// See Runtime::attach.
-  Result<unsigned> attach(RTCScene scene, InstanceGeometry& instances);
+  Result<unsigned> attach(EmbreeSceneRef scene, InstanceGeometry& instances);
   unsigned geometry_id() const { return geometry_id_; }
 
  private:
-  const RTCDevice device_;
-  RTCGeometry geometry_ = nullptr;  ///< null until attach()
-  RTCScene scene_ = nullptr;        ///< that geometry_ is attached to; retained
-  unsigned geometry_id_ = RTC_INVALID_GEOMETRY_ID;
+  const EmbreeDevice device_;
+  EmbreeScene scene_;        ///< that geometry_ is attached to
+  EmbreeGeometry geometry_;  ///< null until attach()
+  unsigned geometry_id_ = kNoGeometry;
 };
 
 }  // namespace farfield

@@ -2,9 +2,9 @@
 // What a host tells Farfield about a ray, and what it learns about a hit.
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <cstdint>
+
+#include "farfield/embree.h"
 
 namespace farfield {
 

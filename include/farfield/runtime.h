@@ -19,8 +19,6 @@
 // value() throws what went wrong; hosts that go on without look at the Result. A test compiles these lines.
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
@@ -30,6 +28,7 @@
 #include <vector>
 
 #include "farfield/camera.h"
+#include "farfield/embree.h"
 #include "farfield/export.h"
 #include "farfield/interaction.h"
 #include "farfield/ray.h"

@@ -3,7 +3,7 @@
 // Nothing here is needed to use Farfield; what is stands in each sample's main.cpp.
 #pragma once
 
-#include <embree3/rtcore.h>
+#include <farfield/embree.h>
 #include <farfield/runtime.h>
 
 #include <algorithm>

@@ -10,7 +10,7 @@
 // a picture that needed no fallback must be the one of wait mode, and such a picture must come. The first breach ends
 // the program with a line that names it, and exit code 1. Without BUDGET_MIB the budget is a third of the way from what
 // the roots take to what the cameras ask for.
-#include <embree3/rtcore.h>
+#include <farfield/embree.h>
 #include <farfield/runtime.h>
 
 #include <cstdio>

@@ -3,7 +3,7 @@
 // triangles, a camera, a sky, a path loop. The lines that are there for Farfield are marked (1) to (6).
 //
 //   minimal_host ASSET.farfield OUT.ppm [BUDGET_MIB]
-#include <embree3/rtcore.h>
+#include <farfield/embree.h>
 #include <farfield/runtime.h>
 
 #include <cstdio>

@@ -8,7 +8,7 @@
 // Writes FOLDER/frame_000.ppm and so on, and a line per frame. `shot` (the default) plans once, for the cameras of all
 // frames: no instance changes its level for another reason than that rays came nearer or went away, and nothing is
 // loaded twice. `frame` plans anew for each frame: what only the near frames needed is given back on the way.
-#include <embree3/rtcore.h>
+#include <farfield/embree.h>
 #include <farfield/runtime.h>
 
 #include <cstdio>

@@ -59,7 +59,7 @@ LevelData crown() {
 /// A grid of instances, once native and once ours.
 class Bench : public LevelSource {
  public:
-  explicit Bench(int side) : device_(*BvhDevice::create()), host_(rtcNewDevice("")) {
+  explicit Bench(int side) : device_(*BvhDevice::create()), host_(*make_embree_device()) {
     add(tree());
     add(crown());
     Rng rng(2);
@@ -88,8 +88,8 @@ class Bench : public LevelSource {
   }
 
   enum class Kind { Native, Surface, Volume };
-  RTCScene scene(Kind kind) const {
-    return kind == Kind::Native ? native_ : (kind == Kind::Surface ? surface_ : volume_);
+  EmbreeSceneRef scene(Kind kind) const {
+    return (kind == Kind::Native ? native_ : (kind == Kind::Surface ? surface_ : volume_)).get();
   }
 
   int64_t trace_all(Kind kind, bool occlusion) const {
@@ -98,13 +98,11 @@ class Bench : public LevelSource {
       RayContext context;
       context.ray_seed = static_cast<uint32_t>(i);
       if (occlusion) {
-        RTCRay ray = rays_[static_cast<size_t>(i)].ray;
-        rtcOccluded1(scene(kind), &context.embree, &ray);
-        hits += ray.tfar < 0.0f;
+        EmbreeRay ray = rays_[static_cast<size_t>(i)].ray;
+        hits += trace_occlusion(scene(kind), context.embree, ray);
       } else {
-        RTCRayHit ray = rays_[static_cast<size_t>(i)];
-        rtcIntersect1(scene(kind), &context.embree, &ray);
-        hits += ray.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+        EmbreeRayHit ray = rays_[static_cast<size_t>(i)];
+        hits += trace_nearest(scene(kind), context.embree, ray);
       }
     }
     return hits;
@@ -123,41 +121,32 @@ class Bench : public LevelSource {
     assets_.push_back(std::move(asset));
   }
 
-  RTCScene make_ours(InstanceGeometry& geometry, uint32_t asset, const std::vector<mat4x3>& places) {
+  EmbreeScene make_ours(InstanceGeometry& geometry, uint32_t asset, const std::vector<mat4x3>& places) {
     for (const mat4x3& m : places) {
       geometry.instances.push_back(*make_instance(asset, m));
       geometry.instances.back().footprint = {0.001f, 1.0f};
     }
-    RTCScene scene = rtcNewScene(host_);
-    RTCGeometry handle = geometry.create(host_);
-    rtcAttachGeometry(scene, handle);
-    rtcReleaseGeometry(handle);
-    rtcCommitScene(scene);
+    EmbreeScene scene = new_scene(host_.get());
+    attach_geometry(scene.get(), geometry.create(host_.get()).get());
+    commit_scene(scene.get());
     return scene;
   }
 
-  RTCScene make_native(const std::vector<mat4x3>& places) {
+  EmbreeScene make_native(const std::vector<mat4x3>& places) {
     const LevelData& level = *data_[0];
-    RTCScene object = rtcNewScene(host_);
-    RTCGeometry mesh = rtcNewGeometry(host_, RTC_GEOMETRY_TYPE_QUAD);
-    rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, level.positions.data(), 0, 12,
-                               level.positions.size());
-    rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, level.quads.data(), 0, 16,
-                               level.quads.size());
-    rtcCommitGeometry(mesh);
-    rtcAttachGeometry(object, mesh);
-    rtcReleaseGeometry(mesh);
-    rtcCommitScene(object);
-    RTCScene scene = rtcNewScene(host_);
+    const EmbreeGeometry mesh = new_quads(host_.get());
+    copy_array<vec3>(mesh.get(), level.positions);
+    copy_array<Quad>(mesh.get(), level.quads);
+    const EmbreeScene object = build_static_scene(host_.get(), mesh.get());
+    EmbreeScene scene = new_scene(host_.get());
     for (const mat4x3& m : places) {
-      RTCGeometry instance = rtcNewGeometry(host_, RTC_GEOMETRY_TYPE_INSTANCE);
-      rtcSetGeometryInstancedScene(instance, object);
-      rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, &m);
-      rtcCommitGeometry(instance);
-      rtcAttachGeometry(scene, instance);
-      rtcReleaseGeometry(instance);
+      const EmbreeGeometry instance(rtcNewGeometry(host_.get(), RTC_GEOMETRY_TYPE_INSTANCE));
+      rtcSetGeometryInstancedScene(instance.get(), object.get());
+      rtcSetGeometryTransform(instance.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, &m);
+      commit_geometry(instance.get());
+      attach_geometry(scene.get(), instance.get());
     }
-    rtcCommitScene(scene);
+    commit_scene(scene.get());
     return scene;
   }
 
@@ -174,25 +163,19 @@ class Bench : public LevelSource {
         origin = vec3(rng.next() * extent_, 2.0f * rng.next() - 1.0f, rng.next() * extent_);
         direction = random_unit(rng);
       }
-      RTCRayHit ray{};
-      ray.ray.org_x = origin.x, ray.ray.org_y = origin.y, ray.ray.org_z = origin.z;
-      ray.ray.dir_x = direction.x, ray.ray.dir_y = direction.y, ray.ray.dir_z = direction.z;
-      ray.ray.tfar = std::numeric_limits<float>::infinity();
-      ray.ray.mask = ~0u;
-      ray.hit.geomID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-      rays_.push_back(ray);
+      rays_.push_back(make_ray_hit(origin, direction));
     }
   }
 
   std::unique_ptr<BvhDevice> device_;
-  RTCDevice host_;
+  EmbreeDevice host_;
   std::vector<std::unique_ptr<LevelData>> data_;
   std::vector<std::unique_ptr<TracedAsset>> assets_;
   std::vector<std::unique_ptr<TracedLevel>> levels_;
   std::unique_ptr<InstanceGeometry> surface_geometry_ = std::make_unique<InstanceGeometry>(*this);
   std::unique_ptr<InstanceGeometry> volume_geometry_ = std::make_unique<InstanceGeometry>(*this);
-  RTCScene native_ = nullptr, surface_ = nullptr, volume_ = nullptr;
-  std::vector<RTCRayHit> rays_;
+  EmbreeScene native_, surface_, volume_;
+  std::vector<EmbreeRayHit> rays_;
   float extent_ = 0;
 };
 

@@ -2,13 +2,12 @@
 // Two ways to see through geometry: its triangles and a volume of it.
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
 
+#include "base/embree.h"
 #include "prefilter/surface.h"
 #include "prefilter/voxelize.h"
 
@@ -17,41 +16,22 @@ namespace farfield::test {
 /// The triangles, to cast long rays at.
 class MeshScene {
  public:
-  explicit MeshScene(const Surface& surface) : device_(rtcNewDevice(nullptr)), scene_(rtcNewScene(device_)) {
-    RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertices = static_cast<vec3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                                sizeof(vec3), surface.positions.size()));
-    std::copy(surface.positions.begin(), surface.positions.end(), vertices);
-    auto* triangles = static_cast<uvec3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                                  sizeof(uvec3), surface.triangles.size()));
-    std::copy(surface.triangles.begin(), surface.triangles.end(), triangles);
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometry(scene_, geometry);
-    rtcReleaseGeometry(geometry);
-    rtcCommitScene(scene_);
+  explicit MeshScene(const Surface& surface) : device_(*make_embree_device()) {
+    const EmbreeGeometry triangles = new_triangles(device_.get());
+    copy_array<vec3>(triangles.get(), surface.positions);
+    copy_array<uvec3>(triangles.get(), surface.triangles);
+    scene_ = build_static_scene(device_.get(), triangles.get());
   }
-  ~MeshScene() {
-    rtcReleaseScene(scene_);
-    rtcReleaseDevice(device_);
-  }
-  MeshScene(const MeshScene&) = delete;
-  MeshScene& operator=(const MeshScene&) = delete;
 
   bool is_hit(const vec3& origin, const vec3& direction) const {
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    RTCRay ray{};
-    ray.org_x = origin.x, ray.org_y = origin.y, ray.org_z = origin.z;
-    ray.dir_x = direction.x, ray.dir_y = direction.y, ray.dir_z = direction.z;
-    ray.tfar = INFINITY;
-    ray.mask = 0xffffffffu;
-    rtcOccluded1(scene_, &context, &ray);
-    return ray.tfar < 0;
+    EmbreeContext context = make_context();
+    EmbreeRay ray = make_ray(origin, direction);
+    return trace_occlusion(scene_.get(), context, ray);
   }
 
  private:
-  RTCDevice device_;
-  RTCScene scene_;
+  EmbreeDevice device_;
+  EmbreeScene scene_;
 };
 
 /// A volume as a dense array, to look along long rays.

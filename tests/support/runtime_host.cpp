@@ -24,18 +24,12 @@ void write_asset(const std::filesystem::path& folder, const std::vector<LevelDat
   write_asset(folder, levels, measure, origin);
 }
 
-Host::Host(RuntimeOptions options) : device_(rtcNewDevice("")) {
+Host::Host(RuntimeOptions options) : device_(*make_embree_device()) {
   options.messages = [this](Severity, const std::string& message) { messages.push_back(message); };
-  auto runtime = Runtime::create(device_, options);
+  auto runtime = Runtime::create(device_.get(), options);
   if (!runtime) ADD_FAILURE() << runtime.error().message;
   FARFIELD_CHECK(runtime.has_value());
   runtime_ = std::move(*runtime);
-}
-
-Host::~Host() {
-  if (scene_) rtcReleaseScene(scene_);
-  runtime_.reset();
-  rtcReleaseDevice(device_);
 }
 
 AssetId Host::add(const std::filesystem::path& folder, const std::vector<mat4x3>& transforms) {
@@ -59,21 +53,15 @@ PlanSummary Host::plan(const vec3& position, float pixel_spread) {
 }
 
 void Host::commit() {
-  if (!scene_) scene_ = rtcNewScene(device_);
-  const auto attached = runtime_->attach(scene_);
+  if (!scene_) scene_ = new_scene(device_.get());
+  const auto attached = runtime_->attach(scene_.get());
   if (!attached) ADD_FAILURE() << attached.error().message;
-  rtcCommitScene(scene_);
+  commit_scene(scene_.get());
 }
 
-bool Host::trace(const vec3& origin, const vec3& direction, RayContext& context, RTCRayHit& ray_hit) const {
-  ray_hit = {};
-  ray_hit.ray.org_x = origin.x, ray_hit.ray.org_y = origin.y, ray_hit.ray.org_z = origin.z;
-  ray_hit.ray.dir_x = direction.x, ray_hit.ray.dir_y = direction.y, ray_hit.ray.dir_z = direction.z;
-  ray_hit.ray.tfar = std::numeric_limits<float>::infinity();
-  ray_hit.ray.mask = 0xffffffffu;
-  ray_hit.hit.geomID = ray_hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(scene_, &context.embree, &ray_hit);
-  return ray_hit.hit.geomID == runtime_->geometry_id();
+bool Host::trace(const vec3& origin, const vec3& direction, RayContext& context, EmbreeRayHit& ray_hit) const {
+  ray_hit = make_ray_hit(origin, direction);
+  return trace_nearest(scene_.get(), context.embree, ray_hit) && ray_hit.hit.geomID == runtime_->geometry_id();
 }
 
 uint64_t hash_of_hits(const Host& host, float spread) {
@@ -87,7 +75,7 @@ uint64_t hash_of_hits(const Host& host, float spread) {
       context.path_seed = rng.next_uint();
       context.ray_seed = rng.next_uint();
       context.cone_spread = spread * rng.next();
-      RTCRayHit hit;
+      EmbreeRayHit hit;
       if (!host.trace(1.2f * random_unit(rng) - 10.0f * direction, direction, context, hit)) continue;
       uint32_t t_bits;
       std::memcpy(&t_bits, &hit.ray.tfar, sizeof t_bits);

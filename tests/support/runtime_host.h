@@ -2,13 +2,12 @@
 // A host around a Runtime, and assets whose sizes are right for it.
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "base/embree.h"
 #include "cache/level.h"
 #include "farfield/runtime.h"
 
@@ -21,26 +20,25 @@ void write_asset(const std::filesystem::path& folder, const std::vector<LevelDat
 class Host {
  public:
   explicit Host(RuntimeOptions options = {});
-  ~Host();
   Runtime& runtime() { return *runtime_; }
-  RTCDevice device() { return device_; }
+  EmbreeDeviceRef device() { return device_.get(); }
   /// Opens, adds one instance per transform. Fails the test on errors.
   AssetId add(const std::filesystem::path& folder, const std::vector<mat4x3>& transforms = {mat4x3(1.0f)});
   /// Plans for one camera at `position` and commits the scene.
   PlanSummary plan(const vec3& position = vec3(0, 0, 10), float pixel_spread = 1e-3f);
   void commit();
-  /// rtcIntersect1 from origin along direction. True: hit on Farfield geometry.
-  bool trace(const vec3& origin, const vec3& direction, RayContext& context, RTCRayHit& ray_hit) const;
-  Interaction interaction(const RTCRayHit& ray_hit, const RayContext& context) const {
+  /// The nearest hit from origin along direction. True: hit on Farfield geometry.
+  bool trace(const vec3& origin, const vec3& direction, RayContext& context, EmbreeRayHit& ray_hit) const;
+  Interaction interaction(const EmbreeRayHit& ray_hit, const RayContext& context) const {
     return runtime_->interaction(ray_hit, context);
   }
 
   std::vector<std::string> messages;
 
  private:
-  RTCDevice device_;
-  RTCScene scene_ = nullptr;
+  EmbreeDevice device_;
   std::unique_ptr<Runtime> runtime_;
+  EmbreeScene scene_;
 };
 
 /// A hash of what 20000 fixed rays see around the unit sphere's place: instance, element, level, t; on all threads.

@@ -24,16 +24,6 @@ using test::triangle_soup;
 
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-RTCRayHit make_ray(const vec3& origin, const vec3& direction, float t_near = 0.0f, float t_far = kInf) {
-  RTCRayHit r{};
-  r.ray.org_x = origin.x, r.ray.org_y = origin.y, r.ray.org_z = origin.z;
-  r.ray.dir_x = direction.x, r.ray.dir_y = direction.y, r.ray.dir_z = direction.z;
-  r.ray.tnear = t_near, r.ray.tfar = t_far;
-  r.ray.mask = 0xffffffffu;
-  r.hit.geomID = r.hit.primID = r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  return r;
-}
-
 /// Any affine transform: rotation, shear, non-uniform scale, mirrored every other time.
 mat4x3 random_transform(Rng& rng, float far = 3.0f) {
   mat4x3 m;
@@ -49,12 +39,7 @@ vec3 apply(const mat4x3& m, const vec3& p) { return m * vec4(p, 1.0f); }
 /// Assets with all levels in memory, and a host scene over their instances.
 class Stage : public LevelSource {
  public:
-  Stage() : device_(*BvhDevice::create()), host_device_(rtcNewDevice("")), geometry_(*this) {}
-  ~Stage() override {
-    if (scene_) rtcReleaseScene(scene_);
-    if (handle_) rtcReleaseGeometry(handle_);
-    rtcReleaseDevice(host_device_);
-  }
+  Stage() : device_(*BvhDevice::create()), host_device_(*make_embree_device()), geometry_(*this) {}
 
   uint32_t add_asset(const std::vector<const LevelData*>& levels) {
     auto asset = std::make_unique<TracedAsset>();
@@ -77,15 +62,14 @@ class Stage : public LevelSource {
     return static_cast<uint32_t>(geometry_.instances.size() - 1);
   }
   /// The host's scene; `plain` adds a triangle mesh of the host's own.
-  RTCScene scene(RTCGeometry plain = nullptr) {
-    scene_ = rtcNewScene(host_device_);
-    handle_ = geometry_.create(host_device_);
-    geom_id = rtcAttachGeometry(scene_, handle_);
-    if (plain) rtcAttachGeometry(scene_, plain);
-    rtcCommitScene(scene_);
-    return scene_;
+  EmbreeSceneRef scene(EmbreeGeometryRef plain = nullptr) {
+    scene_ = new_scene(host_device());
+    geom_id = attach_geometry(scene_.get(), geometry_.create(host_device()).get());
+    if (plain) attach_geometry(scene_.get(), plain);
+    commit_scene(scene_.get());
+    return scene_.get();
   }
-  RTCDevice host_device() { return host_device_; }
+  EmbreeDeviceRef host_device() { return host_device_.get(); }
   InstanceGeometry& geometry() { return geometry_; }
   TracedAsset& asset(uint32_t i) { return *assets_[i]; }
 
@@ -106,10 +90,9 @@ class Stage : public LevelSource {
 
  private:
   std::unique_ptr<BvhDevice> device_;
-  RTCDevice host_device_;
+  EmbreeDevice host_device_;
   InstanceGeometry geometry_;
-  RTCScene scene_ = nullptr;
-  RTCGeometry handle_ = nullptr;
+  EmbreeScene scene_;
   std::vector<std::unique_ptr<TracedAsset>> assets_;
   std::vector<std::vector<const LevelData*>> levels_;
   std::vector<std::unique_ptr<TracedLevel>> built_;
@@ -117,23 +100,21 @@ class Stage : public LevelSource {
 };
 
 /// The same triangles in world space, as a host without Farfield would have them.
-RTCGeometry flatten(RTCDevice device, const LevelData& level, const std::vector<mat4x3>& transforms) {
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  std::vector<uint32_t> triangles;
+EmbreeGeometry flatten(EmbreeDeviceRef device, const LevelData& level, const std::vector<mat4x3>& transforms) {
+  std::vector<uvec3> triangles;
   std::vector<vec3> positions;
   for (const mat4x3& m : transforms) {
     const auto base = static_cast<uint32_t>(positions.size());
     for (const vec3& p : level.positions) positions.push_back(apply(m, p));
     for (const Quad& q : level.quads) {
-      triangles.insert(triangles.end(), {base + q.v0, base + q.v1, base + q.v3});
-      if (q.is_pair()) triangles.insert(triangles.end(), {base + q.v2, base + q.v3, base + q.v1});
+      triangles.emplace_back(base + q.v0, base + q.v1, base + q.v3);
+      if (q.is_pair()) triangles.emplace_back(base + q.v2, base + q.v3, base + q.v1);
     }
   }
-  void* v = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, positions.size());
-  std::copy(positions.begin(), positions.end(), static_cast<vec3*>(v));
-  void* i = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, triangles.size() / 3);
-  std::copy(triangles.begin(), triangles.end(), static_cast<uint32_t*>(i));
-  rtcCommitGeometry(geometry);
+  EmbreeGeometry geometry = new_triangles(device);
+  copy_array<vec3>(geometry.get(), positions);
+  copy_array<uvec3>(geometry.get(), triangles);
+  commit_geometry(geometry.get());
   return geometry;
 }
 
@@ -151,33 +132,29 @@ Counts compare_with_flattened(const LevelData& level, int instance_count, uint64
     transforms.push_back(random_transform(rng));
     stage.add_instance(asset, transforms.back());
   }
-  const RTCScene scene = stage.scene();
-  const RTCScene plain = rtcNewScene(stage.host_device());
-  RTCGeometry mesh = flatten(stage.host_device(), level, transforms);
-  rtcAttachGeometry(plain, mesh);
-  rtcReleaseGeometry(mesh);
-  rtcCommitScene(plain);
+  const EmbreeSceneRef scene = stage.scene();
+  const EmbreeGeometry mesh = flatten(stage.host_device(), level, transforms);
+  const EmbreeScene plain = build_static_scene(stage.host_device(), mesh.get());
 
   Counts counts;
   for (int i = 0; i < 20000; ++i) {
     const vec3 direction = (0.5f + rng.next()) * random_unit(rng);
     const vec3 origin = 3.0f * random_unit(rng) - 3.0f * direction;
-    RTCRayHit a = make_ray(origin, direction);
-    RTCRayHit b = a;
+    EmbreeRayHit a = make_ray_hit(origin, direction);
+    EmbreeRayHit b = a;
     RayContext context;
-    RTCIntersectContext plain_context;
-    rtcInitIntersectContext(&plain_context);
-    rtcIntersect1(scene, &context.embree, &a);
-    rtcIntersect1(plain, &plain_context, &b);
-    RTCRay shadow = make_ray(origin, direction).ray;
-    rtcOccluded1(scene, &context.embree, &shadow);
+    EmbreeContext plain_context = make_context();
+    trace_nearest(scene, context.embree, a);
+    trace_nearest(plain.get(), plain_context, b);
+    EmbreeRay shadow = make_ray(origin, direction);
+    trace_occlusion(scene, context.embree, shadow);
     ++counts.rays;
     const bool hit = a.hit.geomID == stage.geom_id;
     EXPECT_EQ(hit, shadow.tfar < 0.0f);
     EXPECT_EQ(a.ray.org_x, origin.x);
     EXPECT_EQ(a.ray.dir_z, direction.z);
-    counts.hits += b.hit.geomID != RTC_INVALID_GEOMETRY_ID;
-    const bool same = hit == (b.hit.geomID != RTC_INVALID_GEOMETRY_ID) &&
+    counts.hits += b.hit.geomID != kNoGeometry;
+    const bool same = hit == (b.hit.geomID != kNoGeometry) &&
                       (!hit || std::abs(a.ray.tfar - b.ray.tfar) < 1e-4f * (1.0f + b.ray.tfar));
     if (!same) {
       ++counts.different;
@@ -190,7 +167,6 @@ Counts compare_with_flattened(const LevelData& level, int instance_count, uint64
     const vec3 nb = glm::normalize(vec3(b.hit.Ng_x, b.hit.Ng_y, b.hit.Ng_z));
     counts.wrong_normal += glm::dot(na, nb) < 0.999f;  // same side too, mirrored instances included
   }
-  rtcReleaseScene(plain);
   return counts;
 }
 
@@ -213,13 +189,13 @@ TEST(InstanceGeometry, TellsWhichFaceWasHit) {
   test::set_quads(level, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2, 3}});
   Stage stage;
   stage.add_instance(stage.add_asset({&level}), mat4x3(1.0f));
-  const RTCScene scene = stage.scene();
+  const EmbreeSceneRef scene = stage.scene();
   RayContext context;
-  RTCRayHit first = make_ray({0.2f, 0.2f, 1}, {0, 0, -1});
-  rtcIntersect1(scene, &context.embree, &first);
+  EmbreeRayHit first = make_ray_hit({0.2f, 0.2f, 1}, {0, 0, -1});
+  trace_nearest(scene, context.embree, first);
   EXPECT_EQ(context.hit.element, 0u);  // (v0, v1, v3)
-  RTCRayHit second = make_ray({0.8f, 0.8f, 1}, {0, 0, -1});
-  rtcIntersect1(scene, &context.embree, &second);
+  EmbreeRayHit second = make_ray_hit({0.8f, 0.8f, 1}, {0, 0, -1});
+  trace_nearest(scene, context.embree, second);
   EXPECT_EQ(context.hit.element, 1u);  // (v2, v3, v1)
   EXPECT_FALSE(context.hit.is_volume);
 }
@@ -229,17 +205,16 @@ TEST(InstanceGeometry, NearerHostGeometryKeepsItsIds) {
   Stage stage;
   stage.add_instance(stage.add_asset({&soup}), mat4x3(1.0f));
   // The host's own copy of the same triangles: every distance ties, and either may win, but ids must be consistent.
-  RTCGeometry host_mesh = flatten(stage.host_device(), soup, {mat4x3(1.0f)});
-  const RTCScene scene = stage.scene(host_mesh);
-  rtcReleaseGeometry(host_mesh);
+  const EmbreeGeometry host_mesh = flatten(stage.host_device(), soup, {mat4x3(1.0f)});
+  const EmbreeSceneRef scene = stage.scene(host_mesh.get());
   Rng rng(3);
   int host = 0, ours = 0;
   for (int i = 0; i < 5000; ++i) {
     const vec3 direction = random_unit(rng);
-    RTCRayHit ray = make_ray(vec3(0.5f) - 2.0f * direction + 0.3f * random_unit(rng), direction);
+    EmbreeRayHit ray = make_ray_hit(vec3(0.5f) - 2.0f * direction + 0.3f * random_unit(rng), direction);
     RayContext context;
-    rtcIntersect1(scene, &context.embree, &ray);
-    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
+    trace_nearest(scene, context.embree, ray);
+    if (ray.hit.geomID == kNoGeometry) continue;
     if (ray.hit.geomID == stage.geom_id) {
       ++ours;
       ASSERT_EQ(ray.hit.primID, 0u);
@@ -261,43 +236,43 @@ TEST(InstanceGeometry, PacketsAndStreamsSeeTheSameDistancesAsSingleRays) {
   const uint32_t asset = stage.add_asset({&level});
   Rng rng(5);
   for (int i = 0; i < 10; ++i) stage.add_instance(asset, random_transform(rng));
-  const RTCScene scene = stage.scene();
+  const EmbreeSceneRef scene = stage.scene();
 
   constexpr unsigned kRays = 512;
-  std::vector<RTCRayHit> single, rays;
+  std::vector<EmbreeRayHit> single, rays;
   for (unsigned i = 0; i < kRays; ++i) {
     const vec3 direction = random_unit(rng);
-    rays.push_back(make_ray(2.0f * random_unit(rng) - 4.0f * direction, direction));
+    rays.push_back(make_ray_hit(2.0f * random_unit(rng) - 4.0f * direction, direction));
     rays.back().ray.id = i;
   }
   RayContext context;
   context.ray_seed = 77;
   single = rays;
   int hits = 0;
-  for (RTCRayHit& ray : single) {
-    rtcIntersect1(scene, &context.embree, &ray);
+  for (EmbreeRayHit& ray : single) {
+    trace_nearest(scene, context.embree, ray);
     hits += ray.hit.geomID == stage.geom_id;
   }
   EXPECT_GT(hits, 100);
 
-  const auto expect_same = [&](const RTCRayHit& ray, unsigned i, const char* what) {
+  const auto expect_same = [&](const EmbreeRayHit& ray, unsigned i, const char* what) {
     EXPECT_EQ(ray.hit.geomID, single[i].hit.geomID) << what << " " << i;
     EXPECT_EQ(ray.ray.tfar, single[i].ray.tfar) << what << " " << i;
-    if (ray.hit.geomID != RTC_INVALID_GEOMETRY_ID) {
+    if (ray.hit.geomID != kNoGeometry) {
       EXPECT_EQ(ray.hit.primID, single[i].hit.primID) << what << " " << i;
     }
   };
   // Embree 3.13 traces packets that are wider than the machine's registers ray by ray, inactive lanes too.
   const auto packets = [&]<typename RayHitN>(RayHitN, unsigned n, auto trace, const char* what,
                                              RTCDeviceProperty native) {
-    const bool is_native = rtcGetDeviceProperty(rtcGetSceneDevice(scene), native) != 0;
+    const bool is_native = rtcGetDeviceProperty(device_of(scene).get(), native) != 0;
     for (unsigned base = 0; base < kRays; base += n) {
       RayHitN packet;
       alignas(64) int valid[16];
       for (unsigned lane = 0; lane < n; ++lane) {
         valid[lane] = lane % 3 == 1 ? 0 : -1;
         rtcCopyHitToHitN(reinterpret_cast<RTCHitN*>(&packet.hit), &rays[base + lane].hit, n, lane);
-        const RTCRay& r = rays[base + lane].ray;
+        const EmbreeRay& r = rays[base + lane].ray;
         auto* p = reinterpret_cast<RTCRayN*>(&packet.ray);
         RTCRayN_org_x(p, n, lane) = r.org_x, RTCRayN_org_y(p, n, lane) = r.org_y, RTCRayN_org_z(p, n, lane) = r.org_z;
         RTCRayN_dir_x(p, n, lane) = r.dir_x, RTCRayN_dir_y(p, n, lane) = r.dir_y, RTCRayN_dir_z(p, n, lane) = r.dir_z;
@@ -306,7 +281,7 @@ TEST(InstanceGeometry, PacketsAndStreamsSeeTheSameDistancesAsSingleRays) {
       }
       trace(valid, &packet);
       for (unsigned lane = 0; lane < n; ++lane) {
-        RTCRayHit got = rays[base + lane];
+        EmbreeRayHit got = rays[base + lane];
         if (valid[lane]) {
           got.ray.tfar = RTCRayN_tfar(reinterpret_cast<RTCRayN*>(&packet.ray), n, lane);
           got.hit = rtcGetHitFromHitN(reinterpret_cast<RTCHitN*>(&packet.hit), n, lane);
@@ -330,14 +305,14 @@ TEST(InstanceGeometry, PacketsAndStreamsSeeTheSameDistancesAsSingleRays) {
   for (const RTCIntersectContextFlags flags :
        {RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT, RTC_INTERSECT_CONTEXT_FLAG_COHERENT}) {
     context.embree.flags = flags;
-    std::vector<RTCRayHit> stream = rays;
-    rtcIntersect1M(scene, &context.embree, stream.data(), kRays, sizeof(RTCRayHit));
+    std::vector<EmbreeRayHit> stream = rays;
+    rtcIntersect1M(scene, &context.embree, stream.data(), kRays, sizeof(EmbreeRayHit));
     for (unsigned i = 0; i < kRays; ++i) expect_same(stream[i], i, "1M");
-    std::vector<RTCRay> shadows;
-    for (const RTCRayHit& ray : rays) shadows.push_back(ray.ray);
-    rtcOccluded1M(scene, &context.embree, shadows.data(), kRays, sizeof(RTCRay));
+    std::vector<EmbreeRay> shadows;
+    for (const EmbreeRayHit& ray : rays) shadows.push_back(ray.ray);
+    rtcOccluded1M(scene, &context.embree, shadows.data(), kRays, sizeof(EmbreeRay));
     for (unsigned i = 0; i < kRays; ++i) {
-      EXPECT_EQ(shadows[i].tfar < 0.0f, single[i].hit.geomID != RTC_INVALID_GEOMETRY_ID) << i;
+      EXPECT_EQ(shadows[i].tfar < 0.0f, single[i].hit.geomID != kNoGeometry) << i;
     }
   }
 }
@@ -352,7 +327,7 @@ TEST(InstanceGeometry, VolumesKeepTheirTransmittanceUnderAnyAffineTransform) {
     Stage stage;
     const mat4x3 transform = random_transform(rng);
     stage.add_instance(stage.add_asset({&level}), transform);
-    const RTCScene scene = stage.scene();
+    const EmbreeSceneRef scene = stage.scene();
     const vec3 from_local = vec3(0.5f) + 2.0f * random_unit(rng);
     const vec3 to_local = vec3(0.5f) + 0.3f * random_unit(rng);
     const vec3 origin = apply(transform, from_local);
@@ -364,12 +339,12 @@ TEST(InstanceGeometry, VolumesKeepTheirTransmittanceUnderAnyAffineTransform) {
     for (uint32_t seed = 0; seed < kRays; ++seed) {
       RayContext context;
       context.ray_seed = seed;
-      RTCRayHit ray = make_ray(origin, direction);
-      rtcIntersect1(scene, &context.embree, &ray);
+      EmbreeRayHit ray = make_ray_hit(origin, direction);
+      trace_nearest(scene, context.embree, ray);
       const bool hit = ray.hit.geomID == stage.geom_id;
       passed += !hit;
-      RTCRay shadow = make_ray(origin, direction).ray;
-      rtcOccluded1(scene, &context.embree, &shadow);
+      EmbreeRay shadow = make_ray(origin, direction);
+      trace_occlusion(scene, context.embree, shadow);
       ASSERT_EQ(hit, shadow.tfar < 0.0f);  // the same seed gives the same answer
       if (hit) {
         ASSERT_TRUE(context.hit.is_volume);
@@ -387,14 +362,14 @@ TEST(InstanceGeometry, TheNearestOfSurfaceAndVolumeWins) {
   set_volume(level, {1, 1, 1}, vec3(0.0f), [](int, int, int) { return 2.0f; });
   Stage stage;
   stage.add_instance(stage.add_asset({&level}), mat4x3(1.0f));
-  const RTCScene scene = stage.scene();
+  const EmbreeSceneRef scene = stage.scene();
   int surface = 0;
   constexpr int kRays = 20000;
   for (uint32_t seed = 0; seed < kRays; ++seed) {
     RayContext context;
     context.ray_seed = seed;
-    RTCRayHit ray = make_ray({-1.0f, 0.51f, 0.52f}, {1, 0, 0});
-    rtcIntersect1(scene, &context.embree, &ray);
+    EmbreeRayHit ray = make_ray_hit({-1.0f, 0.51f, 0.52f}, {1, 0, 0});
+    trace_nearest(scene, context.embree, ray);
     ASSERT_EQ(ray.hit.geomID, stage.geom_id);  // the sphere stops what the volume lets through
     surface += !context.hit.is_volume;
     if (context.hit.is_volume) {
@@ -418,15 +393,15 @@ TEST(InstanceGeometry, InstancesOfOneAssetHaveIndependentFreeFlights) {
     m[3] = vec3(2.0f * static_cast<float>(i), 0, 0);
     stage.add_instance(asset, m);
   }
-  const RTCScene scene = stage.scene();
+  const EmbreeSceneRef scene = stage.scene();
   int passed = 0;
   constexpr int kRays = 40000;
   for (uint32_t seed = 0; seed < kRays; ++seed) {
     RayContext context;
     context.ray_seed = seed;
-    RTCRayHit ray = make_ray({-1.0f, 0.51f, 0.52f}, {1, 0, 0});
-    rtcIntersect1(scene, &context.embree, &ray);
-    passed += ray.hit.geomID == RTC_INVALID_GEOMETRY_ID;
+    EmbreeRayHit ray = make_ray_hit({-1.0f, 0.51f, 0.52f}, {1, 0, 0});
+    trace_nearest(scene, context.embree, ray);
+    passed += ray.hit.geomID == kNoGeometry;
   }
   const double expected = std::exp(-2.1);
   EXPECT_NEAR(passed / double(kRays), expected, 4.5 * std::sqrt(expected * (1 - expected) / kRays));
@@ -443,17 +418,17 @@ TEST(InstanceGeometry, AllInstancesShareLoadedLevelsAndThreadsAgree) {
     Rng rng(9);
     for (int i = 0; i < 50; ++i) stage.add_instance(asset, random_transform(rng));
     stage.geometry().forced_lambda = 0.5f;
-    const RTCScene scene = stage.scene();
+    const EmbreeSceneRef scene = stage.scene();
     std::vector<float> t(20000);
     const ThreadLimit limit(threads);
     parallel_for(t.size(), 64, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         Rng ray_rng(i);
         const vec3 direction = random_unit(ray_rng);
-        RTCRayHit ray = make_ray(4.0f * random_unit(ray_rng) - 4.0f * direction, direction);
+        EmbreeRayHit ray = make_ray_hit(4.0f * random_unit(ray_rng) - 4.0f * direction, direction);
         RayContext context;
         context.path_seed = static_cast<uint32_t>(i);
-        rtcIntersect1(scene, &context.embree, &ray);
+        trace_nearest(scene, context.embree, ray);
         t[i] = ray.ray.tfar;
       }
     });
@@ -537,17 +512,17 @@ TEST(InstanceGeometry, RaysWithoutADirectionOrThatLeaveEmbreesRangeMeetNothing) 
   stage.add_instance(asset, mat4x3(1.0f));
   mat4x3 speck(1e-15f);  // makes 1e18 of a length of 1000, and worse behind it
   stage.add_instance(asset, speck);
-  const RTCScene scene = stage.scene();
+  const EmbreeSceneRef scene = stage.scene();
   Rng rng(14);
   for (int i = 0; i < 2000; ++i) {
     RayContext context;
     context.ray_seed = static_cast<uint32_t>(i);
     const vec3 direction = i == 0 ? vec3(0.0f) : std::pow(10.0f, 8.0f * rng.next()) * random_unit(rng);
-    RTCRayHit ray = make_ray((i % 2 ? -1.0f : -1e4f) * direction, direction);
-    rtcIntersect1(scene, &context.embree, &ray);  // towards the origin, where the speck is
+    EmbreeRayHit ray = make_ray_hit((i % 2 ? -1.0f : -1e4f) * direction, direction);
+    trace_nearest(scene, context.embree, ray);  // towards the origin, where the speck is
     EXPECT_FALSE(std::isnan(ray.ray.tfar));
-    RTCRay shadow = make_ray(-direction, direction).ray;
-    rtcOccluded1(scene, &context.embree, &shadow);
+    EmbreeRay shadow = make_ray(-direction, direction);
+    trace_occlusion(scene, context.embree, shadow);
     EXPECT_FALSE(std::isnan(shadow.tfar));
   }
 }
@@ -559,13 +534,13 @@ TEST(InstanceGeometry, FarAwayInstancesAreHitWithinTheRoundingOfTheirPlace) {
   mat4x3 m(1000.0f);
   m[3] = vec3(1e7f, -1e7f, 1e7f);
   stage.add_instance(asset, m);
-  const RTCScene scene = stage.scene();
+  const EmbreeSceneRef scene = stage.scene();
   Rng rng(13);
   for (int i = 0; i < 2000; ++i) {
     const vec3 direction = random_unit(rng);
-    RTCRayHit ray = make_ray(m[3] - 3000.0f * direction, direction);
+    EmbreeRayHit ray = make_ray_hit(m[3] - 3000.0f * direction, direction);
     RayContext context;
-    rtcIntersect1(scene, &context.embree, &ray);
+    trace_nearest(scene, context.embree, ray);
     ASSERT_EQ(ray.hit.geomID, stage.geom_id);
     ASSERT_NEAR(ray.ray.tfar, 2000.0f, 25.0f);  // facets of 1000 (1 - cos(pi/64)) = 1.2, ulp of 1e7 = 1
   }

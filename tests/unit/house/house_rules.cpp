@@ -42,6 +42,18 @@ std::string room_of_include(const std::string& path, const std::string& file) {
   return folder == "farfield" ? "include" : folder;
 }
 
+/// "FILE:LINE: MATCH" for all that matches, with the expression's first group as MATCH.
+Lines find_in_lines(const SourceFile& file, const std::regex& expression) {
+  Lines found;
+  const Lines lines = lines_of(file.text);
+  for (size_t i = 0; i < lines.size(); ++i) {
+    for (std::sregex_iterator match(lines[i].begin(), lines[i].end(), expression), end; match != end; ++match) {
+      found.push_back(fmt::format("{}:{}: {}", file.name, i + 1, (*match)[1].str()));
+    }
+  }
+  return found;
+}
+
 /// Follows the arrows from the end of `path`; a circle's rooms, or nothing.
 Lines circle_from(const Arrows& arrows, Lines path) {
   const auto next = arrows.find(path.back());
@@ -128,6 +140,16 @@ std::vector<std::string> find_forbidden_includes(const SourceFile& file, const A
     problems.push_back(fmt::format("{}:{}: {} may not include {} (\"{}\")", file.name, i + 1, own_room, room, path));
   }
   return problems;
+}
+
+std::vector<std::string> find_embree_includes(const SourceFile& file) {
+  static const std::regex include(R"(^ *# *include ([<"]embree\d*/[^>"]+[>"]))");
+  return find_in_lines(file, include);
+}
+
+std::vector<std::string> find_embree_names(const SourceFile& file) {
+  static const std::regex name(R"(\b(rtc[A-Z]\w*|RTC[A-Z_]\w*))");
+  return find_in_lines(file, name);
 }
 
 std::string find_circle(const Arrows& arrows) {

@@ -25,6 +25,12 @@ Arrows read_arrows(std::string_view markdown);
 /// "FILE:LINE: ..." for each #include of a room that the arrows do not allow.
 std::vector<std::string> find_forbidden_includes(const SourceFile& file, const Arrows& arrows);
 
+/// "FILE:LINE: <embree3/...>" for each #include of Embree's own headers.
+std::vector<std::string> find_embree_includes(const SourceFile& file);
+
+/// "FILE:LINE: NAME" for each name of Embree's (rtcIntersect1, RTCRay, RTC_ERROR_NONE), in comments too.
+std::vector<std::string> find_embree_names(const SourceFile& file);
+
 /// "a -> b -> a" for a circle in the arrows; empty if there is none.
 std::string find_circle(const Arrows& arrows);
 

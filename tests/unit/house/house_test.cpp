@@ -69,6 +69,48 @@ TEST(House, RoomsIncludeOnlyWhatTheTableAllows) {
   EXPECT_EQ(list(problems), "") << "see the table of rooms in docs/architecture.md";
 }
 
+/// Who may use Embree's own names: a move to another version of Embree is made in these files.
+const std::set<std::string> kMayNameEmbree = {
+    // its names for all others
+    "base/embree.cpp",
+    "base/embree.h",
+    // the callbacks, with Embree's arguments
+    "bvh/instance_geometry.cpp",
+    "bvh/instance_geometry.h",
+    // what hosts see, and its definitions
+    "include/farfield/ray.h",
+    "include/farfield/runtime.h",
+    "runtime/interaction.cpp",
+    "runtime/interaction_model.h",
+    "runtime/runtime.cpp",
+    // Embree's own instances, to compare with; packets and streams
+    "tests/bench/bvh_bench.cpp",
+    "tests/unit/bvh/instance_geometry_test.cpp",
+};
+
+/// Hosts call Embree as they like, and the rules' tests break the rules.
+bool is_free_to_name_embree(const std::string& file) {
+  return kMayNameEmbree.contains(file) || file.starts_with("samples/") || file.starts_with("tests/unit/house/");
+}
+
+TEST(House, EmbreeIsIncludedInOnePlace) {
+  Problems includes;
+  for (const SourceFile& file : all_sources()) append(includes, find_embree_includes(file));
+  EXPECT_EQ(list(includes), "include/farfield/embree.h:5: <embree3/rtcore.h>") << "include farfield/embree.h";
+}
+
+TEST(House, FewFilesUseEmbreesNames) {
+  Problems problems;
+  std::set<std::string> unused = kMayNameEmbree;
+  for (const SourceFile& file : all_sources()) {
+    const Problems names = find_embree_names(file);
+    if (!names.empty()) unused.erase(file.name);
+    if (!is_free_to_name_embree(file.name)) append(problems, names);
+  }
+  EXPECT_EQ(list(problems), "") << "use base/embree.h";
+  EXPECT_EQ(unused, std::set<std::string>()) << "these need not be in the list";
+}
+
 TEST(House, ArrowsOfTheTableHaveNoCircle) { EXPECT_EQ(find_circle(documented_arrows()), ""); }
 
 TEST(House, NoTypeNameIsDefinedTwice) {
@@ -137,6 +179,17 @@ TEST(HouseRules, FindAnIncludeAgainstTheArrows) {
             Problems{});
   EXPECT_EQ(find_forbidden_includes({"roof/tile.h", "#include \"../attic/box.h\""}, arrows).size(), 1u);
   EXPECT_EQ(find_forbidden_includes({"shed/rake.h", ""}, arrows).size(), 1u);
+}
+
+TEST(HouseRules, FindWhereEmbreeIsIncludedAndNamed) {
+  const SourceFile clean{"a.h", "#include \"base/embree.h\"\n#include <farfield/embree.h>\nEmbreeRay artcOne, RTC;\n"};
+  EXPECT_EQ(find_embree_includes(clean), Problems{});
+  EXPECT_EQ(find_embree_names(clean), Problems{});
+  EXPECT_EQ(
+      find_embree_includes({"a.h", "\n#include <embree3/rtcore.h>  // why\n# include \"embree4/rtcore_ray.h\"\n"}),
+      (Problems{"a.h:2: <embree3/rtcore.h>", "a.h:3: \"embree4/rtcore_ray.h\""}));
+  EXPECT_EQ(find_embree_names({"a.h", "\nRTCRay ray = rtcRay(RTC_NONE);\n// as rtcIntersect1 does\n"}),
+            (Problems{"a.h:2: RTCRay", "a.h:2: rtcRay", "a.h:2: RTC_NONE", "a.h:3: rtcIntersect1"}));
 }
 
 TEST(HouseRules, FindACircle) {

@@ -9,7 +9,6 @@
 
 #include "base/parallel.h"
 #include "path_tracer/asset_view.h"
-#include "path_tracer/embree_handles.h"
 #include "tests/support/files.h"
 #include "tests/support/image_statistics.h"
 #include "tests/support/level_builder.h"
@@ -213,12 +212,12 @@ TEST_F(PathTrace, ClampingOnlyTakesAway) {
 class PathTraceScene : public PathTrace {
  protected:
   void SetUp() override {
-    device_ = std::move(*make_device());
+    device_ = std::move(*make_embree_device(thread_count()));
     RuntimeOptions options;
     runtime_ = std::move(*Runtime::create(device_.get(), options));
     const AssetId asset = *runtime_->open_asset(white().string());
     ASSERT_TRUE(runtime_->add_instance(asset, mat4x3(1.0f)));
-    scene_ = std::move(*make_scene(device_, *runtime_));
+    scene_ = std::move(*make_scene(device_.get(), *runtime_));
   }
   Result<TraceStats> trace(const Camera& camera, Film& film, const TraceOptions& options, const Job& job = {}) {
     runtime_->set_cameras({camera.tessellation()});
@@ -229,9 +228,9 @@ class PathTraceScene : public PathTrace {
     return Camera::perspective({0, 0, distance}, {0, 0, -1}, {0, 1, 0}, 2 * std::atan(1.2f / distance), side, side);
   }
 
-  DeviceHandle device_;
+  EmbreeDevice device_;
   std::unique_ptr<Runtime> runtime_;
-  SceneHandle scene_;
+  EmbreeScene scene_;
   Lights lights_ = constant_light();
 };
 

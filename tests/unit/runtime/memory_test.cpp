@@ -82,7 +82,7 @@ void render(const Host& host, float distance) {
       context.cone_spread = 1e-3f;
       for (int bounce = 0; bounce < 4; ++bounce) {
         context.ray_seed = rng.next_uint();
-        RTCRayHit hit;
+        EmbreeRayHit hit;
         if (!host.trace(origin, direction, context, hit)) break;
         const Interaction interaction = host.interaction(hit, context);
         const ScatterSample sample = interaction.sample(rng);

@@ -75,9 +75,9 @@ RuntimeOptions with_lambda(float lambda) {
 // --- Opening ---------------------------------------------------------------------------------------------------------
 
 TEST_F(RuntimeTest, CreateRefusesImpossibleOptions) {
-  RTCDevice device = rtcNewDevice("");
+  const EmbreeDevice device = std::move(*make_embree_device());
   const auto refuses = [&](const RuntimeOptions& options) {
-    const auto runtime = Runtime::create(device, options);
+    const auto runtime = Runtime::create(device.get(), options);
     return !runtime && runtime.error().code == ErrorCode::InvalidArgument;
   };
   EXPECT_TRUE(refuses(with_budget(0)));
@@ -89,8 +89,7 @@ TEST_F(RuntimeTest, CreateRefusesImpossibleOptions) {
   }
   EXPECT_TRUE(refuses(with_lambda(std::numeric_limits<float>::quiet_NaN())));
   EXPECT_FALSE(Runtime::create(nullptr, {}));
-  EXPECT_TRUE(Runtime::create(device, {}));
-  rtcReleaseDevice(device);
+  EXPECT_TRUE(Runtime::create(device.get(), {}));
 }
 
 TEST_F(RuntimeTest, OpensAnAssetAndDescribesIt) {
@@ -226,7 +225,7 @@ TEST_F(RuntimeTest, AttachingAgainTakesNewInstancesAndKeepsTheId) {
   host.plan();
   const unsigned id = host.runtime().geometry_id();
   RayContext context;
-  RTCRayHit hit;
+  EmbreeRayHit hit;
   EXPECT_FALSE(host.trace({5, 0, 10}, {0, 0, -1}, context, hit));
   mat4x3 moved(1.0f);
   moved[3] = vec3(5, 0, 0);
@@ -245,15 +244,14 @@ TEST_F(RuntimeTest, ASceneOfAnotherDeviceIsRefusedAndNothingChanges) {
   const unsigned id = host.runtime().geometry_id();
   for (int i = 0; i < 3; ++i) {  // would release the device too often if it did so once too often
     Host other;
-    const RTCScene foreign = rtcNewScene(other.device());
-    const auto attached = host.runtime().attach(foreign);
+    const EmbreeScene foreign = new_scene(other.device());
+    const auto attached = host.runtime().attach(foreign.get());
     ASSERT_FALSE(attached);
     EXPECT_EQ(attached.error().code, ErrorCode::InvalidArgument);
-    rtcReleaseScene(foreign);
   }
   EXPECT_EQ(host.runtime().geometry_id(), id);
   RayContext context;
-  RTCRayHit hit;
+  EmbreeRayHit hit;
   EXPECT_TRUE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));
 }
 
@@ -261,12 +259,10 @@ TEST_F(RuntimeTest, AttachingToAnotherSceneLeavesTheFirst) {
   Host host;
   host.add(sphere());
   host.plan();
-  const RTCScene second = rtcNewScene(host.device());
-  ASSERT_TRUE(host.runtime().attach(second));
-  rtcReleaseScene(second);
+  ASSERT_TRUE(host.runtime().attach(new_scene(host.device()).get()));
   host.commit();  // back to the first: there once, not twice
   RayContext context;
-  RTCRayHit hit;
+  EmbreeRayHit hit;
   EXPECT_TRUE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));
   EXPECT_TRUE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));
 }
@@ -275,7 +271,7 @@ TEST_F(RuntimeTest, ASceneWithoutInstancesIsEmpty) {
   Host host;
   host.plan();
   RayContext context;
-  RTCRayHit hit;
+  EmbreeRayHit hit;
   EXPECT_FALSE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));
 }
 
@@ -291,7 +287,7 @@ TEST_F(RuntimeTest, OriginsFarFromZeroDoNotCostPrecision) {
   EXPECT_NEAR(lower.x, 1e7f, 4.0f);
   host.plan();
   RayContext context;
-  RTCRayHit hit;
+  EmbreeRayHit hit;
   ASSERT_TRUE(host.trace({0.1f, 0.2f, 10}, {0, 0, -1}, context, hit));
   EXPECT_NEAR(hit.ray.tfar, 10 - std::sqrt(1 - 0.05f), 0.02f);
 }
@@ -434,7 +430,7 @@ TEST_F(RuntimeTest, ALevelThatDidNotFitIsLoadedOnceAPlanHasRoom) {
   const auto level_seen_at = [&](const vec3& middle, float cone_width = 0.0f) {
     RayContext context;
     context.cone_width = cone_width;
-    RTCRayHit hit;
+    EmbreeRayHit hit;
     EXPECT_TRUE(host.trace(middle + vec3(0, 0, 2), {0, 0, -1}, context, hit));
     return host.interaction(hit, context).level;
   };
@@ -493,7 +489,7 @@ TEST_F(RuntimeTest, ABrokenLevelIsReportedOnceAndTheNextCoarserServes) {
   EXPECT_GT(host.runtime().stats().fallbacks, 1000u);
 
   RayContext context;
-  RTCRayHit hit;
+  EmbreeRayHit hit;
   ASSERT_TRUE(host.trace({0, 0, 10}, {0.01f, 0, -1}, context, hit));
   EXPECT_EQ(host.interaction(hit, context).level, 2u);
   host.plan();
@@ -552,7 +548,7 @@ TEST_F(RuntimeTest, JustBelowAndAboveAnIntegerLambdaRaysSeeTheSame) {
       RayContext context;
       context.path_seed = rng.next_uint();
       context.ray_seed = rng.next_uint();
-      RTCRayHit hit;
+      EmbreeRayHit hit;
       const bool is_hit = host.trace(0.9f * test::random_unit(rng) - 5.0f * direction, direction, context, hit);
       seen.push_back(is_hit ? hit.ray.tfar + static_cast<float>(context.hit.level_slot) : -1.0f);
     }
@@ -578,7 +574,7 @@ TEST_F(RuntimeTest, InteractionsSayWhereAndHow) {
   RayContext context;
   context.cone_width = 0.01f;
   context.cone_spread = 0.001f;
-  RTCRayHit hit;
+  EmbreeRayHit hit;
   ASSERT_TRUE(host.trace({1, 2, 13}, {0, 0.01f, -1}, context, hit));
   const Interaction interaction = host.interaction(hit, context);
   EXPECT_EQ(interaction.kind, Interaction::Kind::Surface);
@@ -600,7 +596,7 @@ TEST_F(RuntimeTest, HitsThatAreNotOursOrHaveGoneAreBlackAndSaidOnce) {
   host.add(sphere());
   host.plan();
   RayContext context;
-  RTCRayHit hit;
+  EmbreeRayHit hit;
   ASSERT_TRUE(host.trace({0, 0, 10}, {0, 0.01f, -1}, context, hit));
   ASSERT_EQ(host.interaction(hit, context).kind, Interaction::Kind::Surface);
 
@@ -668,7 +664,7 @@ TEST_F(RuntimeTest, SurfacesAndBlocksOfAlbedoOneAreWhiteFurnaces) {
       int events = 0;
       for (; events < 3000; ++events) {
         context.ray_seed = rng.next_uint();
-        RTCRayHit hit;
+        EmbreeRayHit hit;
         if (!host.trace(origin, direction, context, hit)) break;
         const Interaction interaction = host.interaction(hit, context);
         const ScatterSample sample = interaction.sample(rng);
@@ -715,7 +711,7 @@ TEST_F(RuntimeTest, RaysThatLeaveASurfaceDoNotMeetItAgain) {
     for (int k = 0; k < 500; ++k) {
       const vec3 direction = test::random_unit(rng);
       RayContext context;
-      RTCRayHit hit;
+      EmbreeRayHit hit;
       if (!host.trace(transform[3] - 4.0f * radius * direction, direction, context, hit)) continue;
       const Interaction interaction = host.interaction(hit, context);
       ASSERT_TRUE(is_finite(interaction.position) && is_finite(interaction.geometric_normal));
@@ -724,7 +720,7 @@ TEST_F(RuntimeTest, RaysThatLeaveASurfaceDoNotMeetItAgain) {
         if (glm::dot(wi, interaction.geometric_normal) < 0.0f) wi = -wi;
         RayContext next;
         next.set_origin(context.hit);
-        RTCRayHit again;
+        EmbreeRayHit again;
         ++rays;
         // A sphere is convex: whatever leaves it meets nothing. Its facets are nearly so.
         self_hits += host.trace(interaction.ray_origin(wi), wi, next, again);
@@ -740,7 +736,7 @@ TEST_F(RuntimeTest, ConesWidenWithTheLobe) {
   host.add(sphere());
   host.plan();
   RayContext context;
-  RTCRayHit hit;
+  EmbreeRayHit hit;
   ASSERT_TRUE(host.trace({0, 0, 10}, {0.01f, 0, -1}, context, hit));
   const Interaction interaction = host.interaction(hit, context);
   ScatterSample sample;
