@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <glm/gtc/type_ptr.hpp>
 
 #include "base/hash.h"
 #include "base/result.h"
@@ -20,7 +21,8 @@ using tinygltf::Model;
 constexpr int kMaxJsonDepth = 200;
 
 // What a file may require. The rest changes geometry or looks in ways that we would get wrong.
-constexpr std::string_view kKnownExtensions[] = {"KHR_lights_punctual",
+constexpr std::string_view kKnownExtensions[] = {"EXT_mesh_gpu_instancing",
+                                                 "KHR_lights_punctual",
                                                  "KHR_materials_diffuse_transmission",
                                                  "KHR_materials_emissive_strength",
                                                  "KHR_materials_ior",
@@ -289,6 +291,12 @@ Result<void> apply_sparse(const GltfDocument& document, const tinygltf::Accessor
   return {};
 }
 
+/// Zero and NaN quaternions become the identity.
+glm::dvec4 unit_quaternion(const glm::dvec4& q) {
+  const double length = glm::length(q);
+  return length > 0 && std::isfinite(length) ? q / length : glm::dvec4(0, 0, 0, 1);
+}
+
 uint64_t total_buffer_bytes(const Model& model) {
   uint64_t bytes = 0;
   for (const auto& buffer : model.buffers) bytes += buffer.data.size();
@@ -450,9 +458,7 @@ NodeTransform transform_of(const tinygltf::Node& node) {
   if (node.translation.size() == 3) out.translation = {node.translation[0], node.translation[1], node.translation[2]};
   if (node.scale.size() == 3) out.scale = {node.scale[0], node.scale[1], node.scale[2]};
   if (node.rotation.size() == 4) {
-    const glm::dvec4 q(node.rotation[0], node.rotation[1], node.rotation[2], node.rotation[3]);
-    const double length = glm::length(q);
-    if (length > 0 && std::isfinite(length)) out.rotation = q / length;
+    out.rotation = unit_quaternion({node.rotation[0], node.rotation[1], node.rotation[2], node.rotation[3]});
   }
   return out;
 }
@@ -467,6 +473,45 @@ glm::dmat4 to_matrix(const NodeTransform& transform) {
   m[2] = transform.scale.z * glm::dvec4(2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y), 0);
   m[3] = glm::dvec4(transform.translation, 1);
   return m;
+}
+
+Result<std::vector<glm::dmat4>> instance_transforms(const GltfDocument& document, const tinygltf::Node& node) {
+  const auto extension = node.extensions.find("EXT_mesh_gpu_instancing");
+  if (extension == node.extensions.end()) return std::vector<glm::dmat4>{glm::dmat4(1.0)};
+  const auto place = fmt::format("node {} (EXT_mesh_gpu_instancing)", node.name);
+  const tinygltf::Value none,
+      &attributes = extension->second.Has("attributes") ? extension->second.Get("attributes") : none;
+
+  // Empty when the file does not give the attribute.
+  const auto read = [&](const char* name, int components) -> Result<std::vector<double>> {
+    if (!attributes.IsObject() || !attributes.Has(name)) return std::vector<double>();
+    const double index = extension_number(attributes, name).value_or(-1);
+    if (!(index >= 0 && index < static_cast<double>(document.model.accessors.size()))) {
+      return document.bad(fmt::format("{}: no such accessor for {}", place, name));
+    }
+    return read_accessor(document, static_cast<int>(index), components);
+  };
+  FARFIELD_TRY_LET(const auto translations, read("TRANSLATION", 3));
+  FARFIELD_TRY_LET(const auto rotations, read("ROTATION", 4));
+  FARFIELD_TRY_LET(const auto scales, read("SCALE", 3));
+
+  const size_t count = std::max({translations.size() / 3, rotations.size() / 4, scales.size() / 3});
+  const auto fits = [count](const std::vector<double>& values, size_t components) {
+    return values.empty() || values.size() == count * components;
+  };
+  if (!fits(translations, 3) || !fits(rotations, 4) || !fits(scales, 3)) {
+    return document.bad(place + ": TRANSLATION, ROTATION and SCALE differ in length");
+  }
+  std::vector<glm::dmat4> transforms;
+  transforms.reserve(count);
+  for (size_t i = 0; i < count; ++i) {
+    NodeTransform transform;
+    if (!translations.empty()) transform.translation = glm::make_vec3(&translations[3 * i]);
+    if (!scales.empty()) transform.scale = glm::make_vec3(&scales[3 * i]);
+    if (!rotations.empty()) transform.rotation = unit_quaternion(glm::make_vec4(&rotations[4 * i]));
+    transforms.push_back(to_matrix(transform));
+  }
+  return transforms;
 }
 
 bool is_invertible(const glm::dmat4& m) {

@@ -57,6 +57,10 @@ struct NodeTransform {
 NodeTransform transform_of(const tinygltf::Node& node);
 glm::dmat4 to_matrix(const NodeTransform& transform);
 
+/// Where a node shows its mesh, in the node's own space: once at its origin, or as EXT_mesh_gpu_instancing says.
+/// Errors: BadFile (no such accessor, attributes of different lengths).
+Result<std::vector<glm::dmat4>> instance_transforms(const GltfDocument& document, const tinygltf::Node& node);
+
 /// Whether all entries are finite and the volume that the unit cube becomes is not zero.
 bool is_invertible(const glm::dmat4& matrix);
 

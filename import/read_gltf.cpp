@@ -286,14 +286,22 @@ class GltfMeshReader {
       world[at] = to_matrix(transform_of(node));
       if (parent[at] >= 0) world[at] = world[static_cast<size_t>(parent[at])] * world[at];
       if (node.mesh < 0) continue;
-      if (!is_invertible(world[at])) {
-        mesh_.warnings.push_back(fmt::format("node {} ({}): its transform is singular; left out", n, node.name));
-        continue;
-      }
       // glTF 2.0, 3.7.3.3: a skinned mesh stands where its skeleton is, not where its node is.
       if (node.skin >= 0)
         mesh_.warnings.push_back(fmt::format("node {}: skinning is ignored, the mesh is taken as stored", n));
-      if (auto done = add_mesh(node.mesh, world[at]); !done) return done;
+      FARFIELD_TRY_LET(const auto instances, instance_transforms(document_, node));
+      size_t singular = 0;
+      for (const glm::dmat4& instance : instances) {
+        const glm::dmat4 to_world = world[at] * instance;
+        if (!is_invertible(to_world)) {
+          ++singular;
+        } else if (auto done = add_mesh(node.mesh, to_world); !done) {
+          return done;
+        }
+      }
+      if (singular > 0) {
+        mesh_.warnings.push_back(fmt::format("node {} ({}): its transform is singular; left out", n, node.name));
+      }
     }
     return {};
   }
