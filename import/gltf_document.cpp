@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstring>
 #include <glm/gtc/type_ptr.hpp>
+#include <set>
 
 #include "base/hash.h"
 #include "base/result.h"
@@ -22,10 +23,12 @@ constexpr int kMaxJsonDepth = 200;
 
 // What a file may require. The rest changes geometry or looks in ways that we would get wrong.
 constexpr std::string_view kKnownExtensions[] = {"EXT_mesh_gpu_instancing",
+                                                 "EXT_texture_webp",
                                                  "KHR_lights_punctual",
                                                  "KHR_materials_diffuse_transmission",
                                                  "KHR_materials_emissive_strength",
                                                  "KHR_materials_ior",
+                                                 "KHR_materials_pbrSpecularGlossiness",
                                                  "KHR_materials_specular",
                                                  "KHR_materials_unlit",
                                                  "KHR_mesh_quantization",
@@ -113,6 +116,23 @@ std::string used_compression(const Model& model) {
   return "";
 }
 
+/// Extensions of materials that the mesh reader warns about, each with the material's name.
+constexpr std::string_view kNamedByMaterials[] = {"KHR_materials_transmission", "KHR_materials_clearcoat",
+                                                  "KHR_materials_sheen", "KHR_materials_anisotropy"};
+
+/// A line for each extension that is used, not required, and not read.
+std::vector<std::string> warn_of_unknown_extensions(const Model& model) {
+  const auto has = [](const auto& names, const std::string& name) {
+    return std::find(std::begin(names), std::end(names), name) != std::end(names);
+  };
+  std::vector<std::string> warnings;
+  for (const std::string& name : std::set<std::string>(model.extensionsUsed.begin(), model.extensionsUsed.end())) {
+    if (has(kKnownExtensions, name) || has(kNamedByMaterials, name)) continue;
+    warnings.push_back(fmt::format("extension {} is not read; what it adds is ignored", name));
+  }
+  return warnings;
+}
+
 /// Names all required extensions that we do not know, or "".
 std::string unknown_extensions(const Model& model) {
   std::string names;
@@ -151,7 +171,7 @@ Result<void> check_meshes(const GltfDocument& document) {
 Result<void> check_textures(const GltfDocument& document) {
   const Model& model = document.model;
   for (size_t t = 0; t < model.textures.size(); ++t) {
-    if (!is_index(model.textures[t].source, model.images) || !is_index(model.textures[t].sampler, model.samplers)) {
+    if (!is_index(image_of(model.textures[t]), model.images) || !is_index(model.textures[t].sampler, model.samplers)) {
       return document.bad(fmt::format("texture {}: no such image or sampler", t));
     }
   }
@@ -341,11 +361,19 @@ Result<GltfDocument> open_gltf(std::span<const unsigned char> bytes, const fs::p
   }
   if (!ok) return document.bad(first_line(error));
   document.files = std::move(access.files);
+  document.warnings = warn_of_unknown_extensions(document.model);
 
   for (const auto check : {check_meshes, check_textures, check_nodes}) {
     if (auto good = check(document); !good) return tl::unexpected(good.error());
   }
   return document;
+}
+
+int image_of(const tinygltf::Texture& texture) {
+  const auto webp = texture.extensions.find("EXT_texture_webp");
+  if (webp == texture.extensions.end()) return texture.source;
+  const auto source = extension_number(webp->second, "source");
+  return source ? static_cast<int>(std::clamp(*source, -1e9, 1e9)) : texture.source;
 }
 
 int component_count(const GltfDocument& document, int accessor) {

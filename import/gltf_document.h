@@ -38,6 +38,9 @@ Result<std::vector<uint32_t>> read_indices(const GltfDocument& document, int ind
 /// The encoded bytes of an image, wherever they are. Errors: BadFile, NotFound.
 Result<std::vector<unsigned char>> image_bytes(const GltfDocument& document, int image);
 
+/// The index of a texture's image, the one of EXT_texture_webp where there is one; -1: none.
+int image_of(const tinygltf::Texture& texture);
+
 /// How many components the elements of an accessor have (VEC3: 3). The index must be valid.
 int component_count(const GltfDocument& document, int accessor);
 
