@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <glm/gtc/type_ptr.hpp>
+#include <set>
 
 #include "base/hash.h"
 #include "base/result.h"
@@ -20,10 +22,13 @@ using tinygltf::Model;
 constexpr int kMaxJsonDepth = 200;
 
 // What a file may require. The rest changes geometry or looks in ways that we would get wrong.
-constexpr std::string_view kKnownExtensions[] = {"KHR_lights_punctual",
+constexpr std::string_view kKnownExtensions[] = {"EXT_mesh_gpu_instancing",
+                                                 "EXT_texture_webp",
+                                                 "KHR_lights_punctual",
                                                  "KHR_materials_diffuse_transmission",
                                                  "KHR_materials_emissive_strength",
                                                  "KHR_materials_ior",
+                                                 "KHR_materials_pbrSpecularGlossiness",
                                                  "KHR_materials_specular",
                                                  "KHR_materials_unlit",
                                                  "KHR_mesh_quantization",
@@ -111,6 +116,23 @@ std::string used_compression(const Model& model) {
   return "";
 }
 
+/// Extensions of materials that the mesh reader warns about, each with the material's name.
+constexpr std::string_view kNamedByMaterials[] = {"KHR_materials_transmission", "KHR_materials_clearcoat",
+                                                  "KHR_materials_sheen", "KHR_materials_anisotropy"};
+
+/// A line for each extension that is used, not required, and not read.
+std::vector<std::string> warn_of_unknown_extensions(const Model& model) {
+  const auto has = [](const auto& names, const std::string& name) {
+    return std::find(std::begin(names), std::end(names), name) != std::end(names);
+  };
+  std::vector<std::string> warnings;
+  for (const std::string& name : std::set<std::string>(model.extensionsUsed.begin(), model.extensionsUsed.end())) {
+    if (has(kKnownExtensions, name) || has(kNamedByMaterials, name)) continue;
+    warnings.push_back(fmt::format("extension {} is not read; what it adds is ignored", name));
+  }
+  return warnings;
+}
+
 /// Names all required extensions that we do not know, or "".
 std::string unknown_extensions(const Model& model) {
   std::string names;
@@ -149,7 +171,7 @@ Result<void> check_meshes(const GltfDocument& document) {
 Result<void> check_textures(const GltfDocument& document) {
   const Model& model = document.model;
   for (size_t t = 0; t < model.textures.size(); ++t) {
-    if (!is_index(model.textures[t].source, model.images) || !is_index(model.textures[t].sampler, model.samplers)) {
+    if (!is_index(image_of(model.textures[t]), model.images) || !is_index(model.textures[t].sampler, model.samplers)) {
       return document.bad(fmt::format("texture {}: no such image or sampler", t));
     }
   }
@@ -289,6 +311,12 @@ Result<void> apply_sparse(const GltfDocument& document, const tinygltf::Accessor
   return {};
 }
 
+/// Zero and NaN quaternions become the identity.
+glm::dvec4 unit_quaternion(const glm::dvec4& q) {
+  const double length = glm::length(q);
+  return length > 0 && std::isfinite(length) ? q / length : glm::dvec4(0, 0, 0, 1);
+}
+
 uint64_t total_buffer_bytes(const Model& model) {
   uint64_t bytes = 0;
   for (const auto& buffer : model.buffers) bytes += buffer.data.size();
@@ -333,11 +361,19 @@ Result<GltfDocument> open_gltf(std::span<const unsigned char> bytes, const fs::p
   }
   if (!ok) return document.bad(first_line(error));
   document.files = std::move(access.files);
+  document.warnings = warn_of_unknown_extensions(document.model);
 
   for (const auto check : {check_meshes, check_textures, check_nodes}) {
     if (auto good = check(document); !good) return tl::unexpected(good.error());
   }
   return document;
+}
+
+int image_of(const tinygltf::Texture& texture) {
+  const auto webp = texture.extensions.find("EXT_texture_webp");
+  if (webp == texture.extensions.end()) return texture.source;
+  const auto source = extension_number(webp->second, "source");
+  return source ? static_cast<int>(std::clamp(*source, -1e9, 1e9)) : texture.source;
 }
 
 int component_count(const GltfDocument& document, int accessor) {
@@ -450,9 +486,7 @@ NodeTransform transform_of(const tinygltf::Node& node) {
   if (node.translation.size() == 3) out.translation = {node.translation[0], node.translation[1], node.translation[2]};
   if (node.scale.size() == 3) out.scale = {node.scale[0], node.scale[1], node.scale[2]};
   if (node.rotation.size() == 4) {
-    const glm::dvec4 q(node.rotation[0], node.rotation[1], node.rotation[2], node.rotation[3]);
-    const double length = glm::length(q);
-    if (length > 0 && std::isfinite(length)) out.rotation = q / length;
+    out.rotation = unit_quaternion({node.rotation[0], node.rotation[1], node.rotation[2], node.rotation[3]});
   }
   return out;
 }
@@ -467,6 +501,45 @@ glm::dmat4 to_matrix(const NodeTransform& transform) {
   m[2] = transform.scale.z * glm::dvec4(2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y), 0);
   m[3] = glm::dvec4(transform.translation, 1);
   return m;
+}
+
+Result<std::vector<glm::dmat4>> instance_transforms(const GltfDocument& document, const tinygltf::Node& node) {
+  const auto extension = node.extensions.find("EXT_mesh_gpu_instancing");
+  if (extension == node.extensions.end()) return std::vector<glm::dmat4>{glm::dmat4(1.0)};
+  const auto place = fmt::format("node {} (EXT_mesh_gpu_instancing)", node.name);
+  const tinygltf::Value none,
+      &attributes = extension->second.Has("attributes") ? extension->second.Get("attributes") : none;
+
+  // Empty when the file does not give the attribute.
+  const auto read = [&](const char* name, int components) -> Result<std::vector<double>> {
+    if (!attributes.IsObject() || !attributes.Has(name)) return std::vector<double>();
+    const double index = extension_number(attributes, name).value_or(-1);
+    if (!(index >= 0 && index < static_cast<double>(document.model.accessors.size()))) {
+      return document.bad(fmt::format("{}: no such accessor for {}", place, name));
+    }
+    return read_accessor(document, static_cast<int>(index), components);
+  };
+  FARFIELD_TRY_LET(const auto translations, read("TRANSLATION", 3));
+  FARFIELD_TRY_LET(const auto rotations, read("ROTATION", 4));
+  FARFIELD_TRY_LET(const auto scales, read("SCALE", 3));
+
+  const size_t count = std::max({translations.size() / 3, rotations.size() / 4, scales.size() / 3});
+  const auto fits = [count](const std::vector<double>& values, size_t components) {
+    return values.empty() || values.size() == count * components;
+  };
+  if (!fits(translations, 3) || !fits(rotations, 4) || !fits(scales, 3)) {
+    return document.bad(place + ": TRANSLATION, ROTATION and SCALE differ in length");
+  }
+  std::vector<glm::dmat4> transforms;
+  transforms.reserve(count);
+  for (size_t i = 0; i < count; ++i) {
+    NodeTransform transform;
+    if (!translations.empty()) transform.translation = glm::make_vec3(&translations[3 * i]);
+    if (!scales.empty()) transform.scale = glm::make_vec3(&scales[3 * i]);
+    if (!rotations.empty()) transform.rotation = unit_quaternion(glm::make_vec4(&rotations[4 * i]));
+    transforms.push_back(to_matrix(transform));
+  }
+  return transforms;
 }
 
 bool is_invertible(const glm::dmat4& m) {

@@ -38,6 +38,9 @@ Result<std::vector<uint32_t>> read_indices(const GltfDocument& document, int ind
 /// The encoded bytes of an image, wherever they are. Errors: BadFile, NotFound.
 Result<std::vector<unsigned char>> image_bytes(const GltfDocument& document, int image);
 
+/// The index of a texture's image, the one of EXT_texture_webp where there is one; -1: none.
+int image_of(const tinygltf::Texture& texture);
+
 /// How many components the elements of an accessor have (VEC3: 3). The index must be valid.
 int component_count(const GltfDocument& document, int accessor);
 
@@ -56,6 +59,10 @@ struct NodeTransform {
 };
 NodeTransform transform_of(const tinygltf::Node& node);
 glm::dmat4 to_matrix(const NodeTransform& transform);
+
+/// Where a node shows its mesh, in the node's own space: once at its origin, or as EXT_mesh_gpu_instancing says.
+/// Errors: BadFile (no such accessor, attributes of different lengths).
+Result<std::vector<glm::dmat4>> instance_transforms(const GltfDocument& document, const tinygltf::Node& node);
 
 /// Whether all entries are finite and the volume that the unit cube becomes is not zero.
 bool is_invertible(const glm::dmat4& matrix);

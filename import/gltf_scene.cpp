@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <optional>
 #include <set>
 
 #include "base/result.h"
@@ -113,6 +114,8 @@ dmat4 world_matrix(const GltfScene& scene, uint32_t node, double seconds) {
   return world;
 }
 
+dmat4 to_square(const mat4x3& m) { return dmat4(dvec4(m[0], 0), dvec4(m[1], 0), dvec4(m[2], 0), dvec4(m[3], 1)); }
+
 mat4x3 to_affine(const dmat4& m) { return mat4x3(vec3(m[0]), vec3(m[1]), vec3(m[2]), vec3(m[3])); }
 
 /// Puts a camera where its node is. Scales, mirrors and shears are taken out: forward stays, up is made upright to it.
@@ -142,7 +145,7 @@ class SceneReader {
       FARFIELD_TRY(read_animation(animation));
     }
     find_time_range();
-    place_everything(order);
+    FARFIELD_TRY(place_everything(order));
     return std::move(scene_);
   }
 
@@ -318,21 +321,55 @@ class SceneReader {
     }
   }
 
-  void place_everything(const std::vector<int>& order) {
+  Result<void> place_everything(const std::vector<int>& order) {
     const std::vector<dmat4> world = world_matrices(scene_, 0);
     for (uint32_t i = 0; i < order.size(); ++i) {
       const auto& node = model_.nodes[static_cast<size_t>(order[i])];
-      if (node.mesh >= 0) {
-        if (is_invertible(world[i])) {
-          scene_.instances.push_back({static_cast<uint32_t>(node.mesh), to_affine(world[i]), node.name, i});
-        } else {
-          warn(fmt::format("node {} ({}): its transform is singular; left out", order[i], node.name));
-        }
-      }
+      if (node.mesh >= 0) FARFIELD_TRY(add_instances(node, order[i], i, world[i]));
       if (node.camera >= 0) add_camera(node, i, world[i]);
       const auto light = node.extensions.find("KHR_lights_punctual");
       if (light != node.extensions.end()) add_light(node, light->second, i, world[i]);
     }
+    return {};
+  }
+
+  Result<void> add_instances(const tinygltf::Node& node, int number, uint32_t index, const dmat4& world) {
+    FARFIELD_TRY_LET(const auto transforms, instance_transforms(document_, node));
+    const auto first_seen = [&](const dmat4& in_node) -> std::optional<dmat4> {
+      if (is_invertible(world * in_node)) return world * in_node;
+      for (const double seconds : times_to_look_at(index)) {
+        const dmat4 then = world_matrix(scene_, index, seconds) * in_node;
+        if (is_invertible(then)) return then;
+      }
+      return std::nullopt;
+    };
+    size_t singular = 0;
+    for (const dmat4& transform : transforms) {
+      const mat4x3 in_node = to_affine(transform);
+      const auto seen = first_seen(to_square(in_node));
+      if (seen) {
+        scene_.instances.push_back({static_cast<uint32_t>(node.mesh), to_affine(*seen), node.name, index, in_node});
+      } else {
+        ++singular;
+      }
+    }
+    if (singular > 0) warn(fmt::format("node {} ({}): its transform is singular; left out", number, node.name));
+    return {};
+  }
+
+  /// The keys of a node and its ancestors, and the times halfway between them, in order.
+  std::set<double> times_to_look_at(uint32_t node) const {
+    std::set<double> keys;
+    for (auto n = static_cast<int32_t>(node); n >= 0; n = scene_.nodes[static_cast<size_t>(n)].parent) {
+      for (const uint32_t channel : scene_.nodes[static_cast<size_t>(n)].channels) {
+        keys.insert(scene_.channels[channel].times.begin(), scene_.channels[channel].times.end());
+      }
+    }
+    std::set<double> times = keys;
+    for (auto key = keys.begin(); key != keys.end() && std::next(key) != keys.end(); ++key) {
+      times.insert(0.5 * (*key + *std::next(key)));
+    }
+    return times;
   }
 
   void add_camera(const tinygltf::Node& node, uint32_t index, const dmat4& world) {
@@ -410,9 +447,10 @@ std::vector<GltfInstance> GltfScene::instances_at(double seconds) const {
   const std::vector<dmat4> world = world_matrices(*this, seconds);
   std::vector<GltfInstance> placed;
   for (const GltfInstance& instance : instances) {
-    if (!is_invertible(world[instance.node])) continue;
+    const dmat4 to_world = world[instance.node] * to_square(instance.in_node);
+    if (!is_invertible(to_world)) continue;
     placed.push_back(instance);
-    placed.back().to_world = to_affine(world[instance.node]);
+    placed.back().to_world = to_affine(to_world);
   }
   return placed;
 }

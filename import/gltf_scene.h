@@ -20,12 +20,13 @@ struct GltfMesh {
   uint64_t triangle_count = 0;  ///< as the accessors promise it; 0 means there is nothing to bake
 };
 
-/// One node that shows a mesh.
+/// One place where a node shows a mesh.
 struct GltfInstance {
   uint32_t mesh = 0;   ///< index into GltfScene::meshes
   mat4x3 to_world{1};  ///< mesh space to world; may scale, mirror and shear; always finite and invertible
   std::string name;    ///< of the node
   uint32_t node = 0;   ///< index into GltfScene::nodes
+  mat4x3 in_node{1};   ///< mesh space to the node's space: EXT_mesh_gpu_instancing shows a mesh many times in one node
 };
 
 /// A camera where it stands at some time. It looks along `forward`; right, up and forward are orthonormal (the node's
@@ -78,11 +79,13 @@ struct GltfNode {
 
 /// Immutable once read; thread-safe.
 struct GltfScene {
-  std::vector<GltfMesh> meshes;         ///< all of the file, instanced or not
-  std::vector<GltfInstance> instances;  ///< of the default scene, at time 0, in the order of a depth-first walk
-  std::vector<GltfCamera> cameras;      ///< of the default scene, at time 0
-  std::vector<GltfLight> lights;        ///< of the default scene
-  std::vector<GltfNode> nodes;          ///< of the default scene, flattened, parents first
+  std::vector<GltfMesh> meshes;  ///< all of the file, instanced or not
+  /// Of the default scene, in the order of a depth-first walk: all that are to be seen at some time, where they stand
+  /// at time 0 or, if their transform is singular then (a plant that grows from nothing), as soon as it is not.
+  std::vector<GltfInstance> instances;
+  std::vector<GltfCamera> cameras;  ///< of the default scene, at time 0
+  std::vector<GltfLight> lights;    ///< of the default scene
+  std::vector<GltfNode> nodes;      ///< of the default scene, flattened, parents first
   std::vector<GltfChannel> channels;
   double start_seconds = 0, end_seconds = 0;  ///< first and last key of all animation; both 0 when nothing moves
   double frames_per_second = 24;              ///< of the keys where they are evenly spaced at a usual rate, else 24
@@ -90,11 +93,11 @@ struct GltfScene {
 
   /// Camera `index` (< cameras.size()) at a time; times outside the animation's range hold its first or last key.
   GltfCamera camera_at(size_t index, double seconds) const;
-  /// All instances at a time. An instance whose transform is singular then is left out, as it is at time 0.
+  /// All instances at a time. An instance whose transform is singular then is left out.
   std::vector<GltfInstance> instances_at(double seconds) const;
   /// Frame n shows the time n / frames_per_second; frame 0 is time 0, as Blender exports it.
   double seconds_of_frame(double frame) const { return frame / frames_per_second; }
-  /// World bounds of the instances at time 0, from GltfMesh::bounds. Empty when there are none.
+  /// World bounds of the instances where `instances` has them, from GltfMesh::bounds. Empty when there are none.
   Box3 bounds_world() const;
 };
 

@@ -103,8 +103,13 @@ class MaterialReader {
     out.roughness = unit(pbr.roughnessFactor);
     set_alpha_mode(source, out);
     set_specular(source, out);
+    const Value* glossiness = extension(source.extensions, "KHR_materials_pbrSpecularGlossiness");
+    if (glossiness && glossiness->IsObject()) set_specular_glossiness(source, *glossiness, out);
     set_transmission(source, out);
-    set_textures(source, out, uv_[target]);
+    if (glossiness && glossiness->IsObject())
+      set_diffuse_texture(*glossiness, out, uv_[target]);
+    else
+      set_textures(source, out, uv_[target]);
     const auto& e = source.emissiveFactor;
     if (std::any_of(e.begin(), e.end(), [](double v) { return v > 0; })) {
       warn(fmt::format("material {}: emission is ignored", source.name));
@@ -145,9 +150,46 @@ class MaterialReader {
     }
   }
 
+  /// What the older workflow says, instead of metallic-roughness: no metal, F0 as given, roughness 1 - glossiness.
+  void set_specular_glossiness(const tinygltf::Material& source, const Value& e, SourceMaterial& out) {
+    out.base_color = vec3(1.0f);
+    out.alpha = 1;
+    if (e.Has("diffuseFactor") && e.Get("diffuseFactor").ArrayLen() == 4) {
+      const Value& factor = e.Get("diffuseFactor");
+      const auto number = [&](int c) { return factor.Get(c).IsNumber() ? factor.Get(c).GetNumberAsDouble() : 1.0; };
+      for (int c = 0; c < 3; ++c) out.base_color[c] = unit(number(c));
+      out.alpha = unit(number(3));
+    }
+    out.metallic = 0;
+    out.dielectric_f0 = glm::clamp(extension_vec3(e, "specularFactor").value_or(vec3(1.0f)), vec3(0.0f), vec3(1.0f));
+    out.roughness = 1 - unit(extension_number(e, "glossinessFactor").value_or(1.0));
+    if (e.Has("specularGlossinessTexture")) {
+      warn(fmt::format("material {}: the texture of specular and glossiness is ignored", source.name));
+    }
+  }
+
+  /// The diffuse texture of specular-glossiness. tinygltf knows no texture there: its index is checked here.
+  void set_diffuse_texture(const Value& e, SourceMaterial& out, UvSource& uv) {
+    if (!e.Has("diffuseTexture")) return;
+    const Value& info = e.Get("diffuseTexture");
+    const double index = extension_number(info, "index").value_or(-1);
+    if (!(index >= 0 && index < static_cast<double>(document_.model.textures.size()))) {
+      warn(fmt::format("diffuse texture {}: there is no such texture; the plain colour is used", index));
+      return;
+    }
+    tinygltf::ExtensionMap extensions;
+    if (info.Has("extensions") && info.Get("extensions").Has("KHR_texture_transform")) {
+      extensions["KHR_texture_transform"] = info.Get("extensions").Get("KHR_texture_transform");
+    }
+    const double set = std::clamp(extension_number(info, "texCoord").value_or(0), 0.0, 99.0);
+    uv = uv_source(static_cast<int>(set), extensions);
+    out.base_color_map =
+        texture(static_cast<int>(index), out.is_masked ? TextureUse::ColorWithAlpha : TextureUse::Color);
+  }
+
   void set_transmission(const tinygltf::Material& source, SourceMaterial& out) {
-    for (const char* ignored : {"KHR_materials_transmission", "KHR_materials_clearcoat", "KHR_materials_sheen",
-                                "KHR_materials_anisotropy", "KHR_materials_pbrSpecularGlossiness"}) {
+    for (const char* ignored :
+         {"KHR_materials_transmission", "KHR_materials_clearcoat", "KHR_materials_sheen", "KHR_materials_anisotropy"}) {
       if (extension(source.extensions, ignored)) warn(fmt::format("material {}: {} is ignored", source.name, ignored));
     }
     const Value* e = extension(source.extensions, "KHR_materials_diffuse_transmission");
@@ -193,17 +235,18 @@ class MaterialReader {
       out.wrap_u = to_wrap(sampler.wrapS);
       out.wrap_v = to_wrap(sampler.wrapT);
     }
-    if (source.source < 0) {
+    const int image_index = image_of(source);
+    if (image_index < 0) {
       warn(fmt::format("texture {}: no image that this version reads; the plain colour is used", index));
       return out;
     }
-    const auto key = std::make_pair(source.source, use);
+    const auto key = std::make_pair(image_index, use);
     const auto found = images_.find(key);
     if (found != images_.end()) {
       out.image = found->second;
       return out;
     }
-    out.image = image(source.source, use);
+    out.image = image(image_index, use);
     images_.emplace(key, out.image);
     return out;
   }
@@ -286,14 +329,22 @@ class GltfMeshReader {
       world[at] = to_matrix(transform_of(node));
       if (parent[at] >= 0) world[at] = world[static_cast<size_t>(parent[at])] * world[at];
       if (node.mesh < 0) continue;
-      if (!is_invertible(world[at])) {
-        mesh_.warnings.push_back(fmt::format("node {} ({}): its transform is singular; left out", n, node.name));
-        continue;
-      }
       // glTF 2.0, 3.7.3.3: a skinned mesh stands where its skeleton is, not where its node is.
       if (node.skin >= 0)
         mesh_.warnings.push_back(fmt::format("node {}: skinning is ignored, the mesh is taken as stored", n));
-      if (auto done = add_mesh(node.mesh, world[at]); !done) return done;
+      FARFIELD_TRY_LET(const auto instances, instance_transforms(document_, node));
+      size_t singular = 0;
+      for (const glm::dmat4& instance : instances) {
+        const glm::dmat4 to_world = world[at] * instance;
+        if (!is_invertible(to_world)) {
+          ++singular;
+        } else if (auto done = add_mesh(node.mesh, to_world); !done) {
+          return done;
+        }
+      }
+      if (singular > 0) {
+        mesh_.warnings.push_back(fmt::format("node {} ({}): its transform is singular; left out", n, node.name));
+      }
     }
     return {};
   }

@@ -46,11 +46,11 @@ std::string make_fingerprint(const RenderOptions& options, std::span<const fs::p
   const TraceOptions& trace = options.trace;
   std::string text = fmt::format(
       "size {}x{} spp {} seed {} depth {} roulette {} clamp {} strategy {} transparent {} budget {} scale {} blend {} "
-      "full {} exposure {} scene {} environment {} assets",
+      "full {} exposure {} camera {} fps {} scene {} environment {} assets",
       options.width, options.height, trace.samples_per_pixel, trace.seed, trace.max_depth, trace.roulette_depth,
       trace.clamp_indirect, static_cast<int>(trace.strategy), trace.transparent, options.budget_bytes,
-      options.lod_scale, static_cast<int>(options.blend), options.full_detail, options.exposure_stops,
-      identity(options.scene), identity(options.environment));
+      options.lod_scale, static_cast<int>(options.blend), options.full_detail, options.exposure_stops, options.camera,
+      options.frames_per_second, identity(options.scene), identity(options.environment));
   for (const fs::path& folder : asset_folders)
     if (!folder.empty()) text += fmt::format(" {}:{}", folder.filename().string(), to_hex(manifest_hash(folder)));
   return text;
@@ -96,6 +96,9 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOption
   renderer->options_ = options;
 
   FARFIELD_TRY_LET(auto scene, read_gltf_scene(options.scene));
+  FARFIELD_TRY_LET(const auto camera, find_camera(scene, options.camera));
+  renderer->camera_ = camera;
+  if (options.frames_per_second > 0) scene.frames_per_second = options.frames_per_second;
   std::vector<std::string> warnings = scene.warnings;
   FARFIELD_TRY_LET(auto lights, make_lights(scene, options, warnings));
   if (options.warning)
@@ -136,7 +139,7 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
       session_instances = std::move(instances);
     }
 
-    const Camera camera = make_camera(scene_, seconds, options_.width, options_.height);
+    const Camera camera = make_camera(scene_, camera_, seconds, options_.width, options_.height);
     const auto done_after = [&](size_t count) {
       return static_cast<double>(count) / static_cast<double>(frames.size());
     };

@@ -41,6 +41,7 @@ class FrameRenderer {
 
   RenderOptions options_;
   GltfScene scene_;
+  size_t camera_ = 0;  // index into scene_.cameras
   Lights lights_;
   std::vector<std::filesystem::path> asset_folders_;  // per mesh
   std::vector<std::string> asset_names_;

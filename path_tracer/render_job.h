@@ -18,7 +18,9 @@ namespace farfield {
 
 /// What render and shot have in common.
 struct RenderOptions {
-  std::filesystem::path scene;  ///< .gltf or .glb
+  std::filesystem::path scene;   ///< .gltf or .glb
+  std::string camera;            ///< its name, or its index in the scene; empty: the first
+  double frames_per_second = 0;  ///< of frame numbers; 0: GltfScene::frames_per_second
   int width = 480;
   int height = 270;
   TraceOptions trace;
@@ -63,8 +65,8 @@ struct RenderReport {
 };
 
 /// Renders one frame to `out` (EXR with all AOVs and metadata) and to the PNG beside it.
-/// frame: n is the scene at n / 24 s (or at the frame rate of its animation, see GltfScene::frames_per_second). Errors:
-/// those of the scene, the bake, the runtime, the files; Cancelled.
+/// frame: n is the scene at n / RenderOptions::frames_per_second, or GltfScene::frames_per_second where that is 0.
+/// Errors: those of the scene, the bake, the runtime, the files; Cancelled.
 Result<RenderReport> render_frame(const RenderOptions& options, int frame, const std::filesystem::path& out);
 
 /// Writes an image to `exr` with its metadata, and as a PNG preview beside it. Errors: those of write_exr, write_png.

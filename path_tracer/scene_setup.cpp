@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 
 #include "base/result.h"
 
@@ -38,9 +39,26 @@ float strength(const GltfLight& light) { return light.intensity * luminance(ligh
 
 }  // namespace
 
-Camera make_camera(const GltfScene& scene, double seconds, int width, int height) {
+Result<size_t> find_camera(const GltfScene& scene, const std::string& name) {
+  if (name.empty()) return size_t{0};
+  const auto& cameras = scene.cameras;
+  const auto named = std::find_if(cameras.begin(), cameras.end(), [&](const GltfCamera& c) { return c.name == name; });
+  if (named != cameras.end()) return static_cast<size_t>(named - cameras.begin());
+  size_t index = 0;
+  const char* const end = name.data() + name.size();
+  const auto [rest, error] = std::from_chars(name.data(), end, index);
+  if (error == std::errc() && rest == end && index < cameras.size()) return index;
+
+  std::string list;
+  for (size_t i = 0; i < cameras.size(); ++i)
+    list += fmt::format("{}{} \"{}\"", i == 0 ? "" : ", ", i, cameras[i].name);
+  return make_error(ErrorCode::InvalidArgument,
+                    fmt::format("there is no camera \"{}\"; the scene has {}", name, list.empty() ? "none" : list));
+}
+
+Camera make_camera(const GltfScene& scene, size_t index, double seconds, int width, int height) {
   if (scene.cameras.empty()) return camera_around(scene.bounds_world(), width, height);
-  const GltfCamera camera = scene.camera_at(0, seconds);
+  const GltfCamera camera = scene.camera_at(index, seconds);
   if (!camera.is_orthographic)
     return Camera::perspective(camera.position, camera.forward, camera.up, camera.yfov_rad, width, height);
   const float width_world = 2 * camera.half_height * static_cast<float>(width) / static_cast<float>(height);

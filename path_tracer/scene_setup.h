@@ -16,9 +16,13 @@ namespace farfield {
 /// glTF's lights are photometric; one watt of ours is 683 lumens of theirs, as Blender's exporter has it.
 inline constexpr float kLumensPerWatt = 683.0f;
 
-/// The scene's first camera at a time, for images of width x height. It keeps its vertical angle (or extent), whatever
-/// the file's aspect ratio. A scene without a camera is seen whole, from above and in front.
-Camera make_camera(const GltfScene& scene, double seconds, int width, int height);
+/// The index of a scene's camera: the first for an empty name, the first of that name, else the name as a number.
+/// Errors: InvalidArgument, with a list of the cameras.
+Result<size_t> find_camera(const GltfScene& scene, const std::string& name);
+
+/// The scene's camera `index` at a time, for images of width x height. It keeps its vertical angle (or extent),
+/// whatever the file's aspect ratio. A scene without a camera is seen whole, from above and in front.
+Camera make_camera(const GltfScene& scene, size_t index, double seconds, int width, int height);
 
 /// Environment: options.environment, or sun and sky. The sun is the brightest directional light, in its direction,
 /// colour and strength; without one default_sun_sky(). Point and spot lights come as they are. What cannot be rendered

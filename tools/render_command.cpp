@@ -36,7 +36,7 @@ void add_render_command(CLI::App& app, Action& action) {
   CLI::App* command =
       app.add_subcommand("render", "Render one frame of a glTF scene; bakes its meshes first if need be");
   add_render_flags(command, *arguments, "EXR file to write; a PNG preview goes beside it");
-  command->add_option("--frame", arguments->frame, "Frame n is the scene at n / 24 s")
+  command->add_option("--frame", arguments->frame, "Frame n is the scene at n / fps seconds, see --fps")
       ->check(CLI::Range(0, 1 << 24))
       ->capture_default_str();
   command->footer(

@@ -63,6 +63,12 @@ void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::
       ->capture_default_str();
   command->add_flag("--full-detail", options.full_detail, "Render the sources, without levels, for comparison");
   command->add_option("--environment", arguments.environment, "Light from a latitude-longitude EXR");
+  command->add_option("--camera", options.camera, "Name or index of a camera of the scene. Without it the first");
+  command
+      ->add_option("--fps", options.frames_per_second,
+                   "Frames per second: frame n is the scene at n / fps. Without it the rate of the animation's keys, "
+                   "else 24")
+      ->check(CLI::Range(0.001, 1e6));
   command->add_option("--exposure", options.exposure_stops, "Of the PNG previews, in stops")
       ->check(CLI::Range(-50, 50));
   command->add_option("--finest-grid", options.finest_grid, "Of assets that have to be baked, a power of two")

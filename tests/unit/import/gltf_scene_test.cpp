@@ -7,6 +7,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include "import/read_source.h"
 #include "tests/support/files.h"
 #include "tests/support/gltf_files.h"
 
@@ -18,6 +19,7 @@ using namespace test;
 namespace fs = std::filesystem;
 
 const fs::path kAssets = FARFIELD_SHARED_ASSETS;
+const fs::path kCases = fs::path(FARFIELD_TEST_DATA) / "import_cases";
 constexpr double kForestYfov = 0.5631968779732008;
 
 float distance(const vec3& a, const vec3& b) { return glm::length(a - b); }
@@ -265,6 +267,70 @@ TEST(GltfScene, LightsKeepTheirPhotometricValueAndDirection) {
   EXPECT_EQ(scene->lights[1].position, vec3(1, 2, 3));
   EXPECT_FLOAT_EQ(scene->lights[1].outer_cone_rad, 0.2f);
   EXPECT_EQ(scene->warnings.size(), 1u);  // light 9 does not exist
+}
+
+TEST(GltfScene, GpuInstancesAreInstancesWhetherUsedOrRequired) {
+  for (const char* name : {"g01_gpu_instancing_used.glb", "g01_gpu_instancing_required.glb"}) {
+    const auto scene = read_gltf_scene(kCases / name);
+    ASSERT_TRUE(scene) << scene.error().message;
+    ASSERT_EQ(scene->instances.size(), 100u);
+    EXPECT_EQ(scene->instances_at(0).size(), 100u);
+    EXPECT_NE(scene->instances[0].to_world[3], scene->instances[99].to_world[3]);
+    EXPECT_EQ(scene->instances_at(0)[99].to_world, scene->instances[99].to_world);
+
+    const auto flattened = read_source(kCases / name);
+    ASSERT_TRUE(flattened) << flattened.error().message;
+    EXPECT_EQ(flattened->face_count(), 200u);
+    Box3 bounds;
+    for (const dvec3& p : flattened->positions) bounds.extend(vec3(p));
+    Box3 corners;  // of the squares in the scene
+    for (const GltfInstance& instance : scene->instances)
+      for (const float x : {-0.5f, 0.5f})
+        for (const float y : {-0.5f, 0.5f}) corners.extend(instance.to_world * vec4(x, y, 0, 1));
+    EXPECT_LT(distance(bounds.lower, corners.lower), 1e-4f);
+    EXPECT_LT(distance(bounds.upper, corners.upper), 1e-4f);
+  }
+}
+
+TEST(GltfScene, GpuInstancesStandInTheSpaceOfTheirNode) {
+  const TemporaryFolder folder;
+  const auto scene = read_gltf_scene(folder.write(
+      "i.glb", scene_file(R"({"mesh":0,"translation":[10,0,0],"scale":[2,2,2],"extensions":{"EXT_mesh_gpu_instancing":
+          {"attributes":{"TRANSLATION":1}}}})",
+                          "0", "", raw<float>({0, 0, 0, 1, 2, 3}),
+                          R"({"bufferView":1,"componentType":5126,"count":2,"type":"VEC3"})")));
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->instances.size(), 2u);
+  EXPECT_EQ(scene->instances[1].to_world * vec4(1, 0, 0, 1), vec3(14, 4, 6));
+}
+
+TEST(GltfScene, GpuInstancesWithAttributesOfDifferentLengthAreRefused) {
+  const TemporaryFolder folder;
+  for (const char* attributes : {R"("TRANSLATION":1,"SCALE":0)", R"("TRANSLATION":7)", R"("ROTATION":1)"}) {
+    const auto scene = read_gltf_scene(
+        folder.write("bad.glb", scene_file(fmt::format(R"({{"mesh":0,"extensions":{{"EXT_mesh_gpu_instancing":
+            {{"attributes":{{{}}}}}}}}})",
+                                                       attributes),
+                                           "0", "", raw<float>({0, 0, 0, 1, 2, 3}),
+                                           R"({"bufferView":1,"componentType":5126,"count":2,"type":"VEC3"})")));
+    ASSERT_FALSE(scene) << attributes;
+    EXPECT_EQ(scene.error().code, ErrorCode::BadFile);
+  }
+}
+
+TEST(GltfScene, WhatGrowsFromNothingIsThereOnceItHasASize) {
+  for (const char* name : {"g02_scale_from_zero.glb", "g02_scale_from_tiny.glb"}) {
+    const auto scene = read_gltf_scene(kCases / name);
+    ASSERT_TRUE(scene) << scene.error().message;
+    EXPECT_EQ(scene->instances.size(), 2u) << name;
+    EXPECT_TRUE(scene->warnings.empty());
+    EXPECT_EQ(scene->instances_at(0).size(), name == std::string("g02_scale_from_zero.glb") ? 1u : 2u);
+    for (const double seconds : {0.25, 1.0}) {
+      const auto placed = scene->instances_at(seconds);
+      ASSERT_EQ(placed.size(), 2u) << name;
+      EXPECT_NEAR(placed[0].to_world[0].x, seconds, 1e-3) << name;
+    }
+  }
 }
 
 TEST(GltfScene, AssetNamesAreUniqueAndFitForFiles) {

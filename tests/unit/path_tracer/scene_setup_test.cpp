@@ -16,6 +16,20 @@ GltfLight directional(const vec3& direction, float lux) {
   return light;
 }
 
+TEST(SceneSetup, CamerasAreFoundByNameAndIndexAndListedInTheError) {
+  const auto scene = read_gltf_scene(FARFIELD_TEST_DATA "/import_cases/g18_two_cameras.glb");
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_EQ(find_camera(*scene, "").value(), 0u);
+  EXPECT_EQ(find_camera(*scene, "shot").value(), 1u);
+  EXPECT_EQ(find_camera(*scene, "1").value(), 1u);
+  for (const char* wrong : {"2", "-1", "1x", "Shot"}) {
+    const auto none = find_camera(*scene, wrong);
+    ASSERT_FALSE(none) << wrong;
+    EXPECT_NE(none.error().message.find("0 \"preview\", 1 \"shot\""), std::string::npos) << none.error().message;
+  }
+  EXPECT_EQ(make_camera(*scene, 1, 0, 20, 10).position(), vec3(0, 0, 5));
+}
+
 TEST(MakeCamera, KeepsTheVerticalAngleForAnyShapeOfImage) {
   GltfScene scene;
   GltfCamera camera;
@@ -26,7 +40,7 @@ TEST(MakeCamera, KeepsTheVerticalAngleForAnyShapeOfImage) {
   scene.nodes.resize(1);
   scene.nodes[0].translation = dvec3(1, 2, 3);
   for (const int width : {10, 400}) {
-    const Camera made = make_camera(scene, 0, width, 100);
+    const Camera made = make_camera(scene, 0, 0, width, 100);
     EXPECT_NEAR(made.tessellation().pixel_spread, 2 * std::tan(0.4f) / 100, 1e-7f);
     EXPECT_LT(glm::length(made.position() - vec3(1, 2, 3)), 1e-6f);
     EXPECT_LT(glm::length(made.forward() - vec3(0, 0, -1)), 1e-6f);
@@ -40,7 +54,7 @@ TEST(MakeCamera, OrthographicKeepsItsHeight) {
   camera.half_height = 3;
   scene.cameras = {camera};
   scene.nodes.resize(1);
-  const Camera made = make_camera(scene, 0, 40, 30);
+  const Camera made = make_camera(scene, 0, 0, 40, 30);
   EXPECT_TRUE(made.is_orthographic());
   EXPECT_FLOAT_EQ(made.tessellation().pixel_width, 6.0f / 30);
 }
@@ -57,7 +71,7 @@ TEST(MakeCamera, WithoutACameraTheWholeSceneIsSeen) {
     scene.instances.push_back(instance);
   }
   for (const auto& [width, height] : {std::pair{100, 20}, std::pair{20, 100}}) {
-    const Camera camera = make_camera(scene, 0, width, height);
+    const Camera camera = make_camera(scene, 0, 0, width, height);
     // Both ends project into the image: inverse of Camera::ray.
     const vec3 right = glm::normalize(glm::cross(camera.forward(), camera.up()));
     for (const vec3& point : {vec3(-51, 0, 0), vec3(71, 5, 30)}) {
@@ -69,7 +83,7 @@ TEST(MakeCamera, WithoutACameraTheWholeSceneIsSeen) {
       EXPECT_LT(std::abs(glm::dot(offset, camera.up())), 0.5f * pixel * static_cast<float>(height));
     }
   }
-  EXPECT_GT(make_camera(GltfScene(), 0, 10, 10).tessellation().pixel_spread, 0.0f);  // nothing to see: no crash
+  EXPECT_GT(make_camera(GltfScene(), 0, 0, 10, 10).tessellation().pixel_spread, 0.0f);  // nothing to see: no crash
 }
 
 TEST(MakeLights, BrightestDirectionalLightIsTheSun) {

@@ -310,6 +310,29 @@ TEST(ImportGltf, SpecularIorAndDiffuseTransmissionExtensions) {
   expect_near(m.transmission, 0.25f * vec3(1, 0.5f, 0) * (1.0f - m.specular));
 }
 
+TEST(ImportGltf, WebpTexturesAndSpecularGlossinessAreRead) {
+  for (const char* name : {"g17_texture_webp_used.glb", "g17_texture_webp_required.glb", "g14_specgloss.glb"}) {
+    const auto mesh = read_source(fs::path(FARFIELD_TEST_DATA) / "import_cases" / name);
+    ASSERT_TRUE(mesh) << mesh.error().message;
+    EXPECT_TRUE(mesh->warnings.empty()) << name << ": " << mesh->warnings.front();
+    ASSERT_EQ(mesh->materials.size(), 1u);
+    const SourceMaterial& material = mesh->materials[0];
+    EXPECT_TRUE(material.base_color_map) << name;
+    EXPECT_EQ(material.metallic, 0.0f) << name;
+    expect_near(material.dielectric_f0, vec3(0.04f));
+    EXPECT_EQ(material.roughness, name == std::string("g14_specgloss.glb") ? 0.0f : 1.0f);
+  }
+}
+
+TEST(ImportGltf, ExtensionsThatAreNotReadAreNamedOnce) {
+  const TemporaryFolder folder;
+  const auto asset = import_asset(folder.write(
+      "m.glb", material_file("{}", R"("extensionsUsed":["KHR_materials_ior","EXT_of_tomorrow","EXT_of_tomorrow"])")));
+  ASSERT_TRUE(asset) << asset.error().message;
+  ASSERT_EQ(asset->warnings.size(), 1u);
+  EXPECT_NE(asset->warnings[0].find("EXT_of_tomorrow"), std::string::npos);
+}
+
 TEST(ImportGltf, TextureTransformMovesTheFootprint) {
   const TemporaryFolder folder;
   const std::string image = png(2, 1, {{255, 0, 0, 255}, {0, 255, 0, 255}});
