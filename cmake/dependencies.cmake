@@ -15,7 +15,6 @@ if(FARFIELD_BUILD_BAKE)
   pkg_check_modules(glu REQUIRED IMPORTED_TARGET glu)
   find_package(ZLIB REQUIRED)
   find_package(TinyGLTF CONFIG REQUIRED)
-  find_package(tinyobjloader CONFIG REQUIRED)
   # OpenImageIO's own CMake config is broken on Debian 12 (it wants tools that its -dev package does not bring).
   pkg_check_modules(oiio REQUIRED IMPORTED_TARGET OpenImageIO)
 endif()

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // OBJ. An own reader, because tinyobjloader cuts faces of more than 255 corners short, does not join continued lines,
-// and needs three times as long; its MTL reader is used.
+// and needs three times as long.
 #include <fmt/format.h>
-#include <tiny_obj_loader.h>
 
 #include <algorithm>
-#include <map>
-#include <sstream>
 
-#include "base/hash.h"
 #include "base/index.h"
-#include "import/read_file.h"
+#include "base/result.h"
+#include "import/material_library.h"
 #include "import/read_formats.h"
 #include "import/text_cursor.h"
 
@@ -19,170 +16,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Materials and textures of the libraries that an OBJ names, by name.
-class MaterialLibraries {
- public:
-  MaterialLibraries(fs::path folder, SourceMesh& mesh) : folder_(std::move(folder)), mesh_(mesh) {}
-
-  /// The rest of an mtllib line: one name with blanks, or several names.
-  void load(std::string_view names) {
-    if (load_file(folder_ / clean(names))) return;
-    TextCursor words(names);
-    for (auto word = words.word(); !word.empty(); word = words.word()) {
-      if (!load_file(folder_ / clean(word))) warn(fmt::format("material library {} cannot be read", word));
-    }
-  }
-
-  /// Index of a material by name; unknown names are the default material, with one warning each.
-  uint32_t find(std::string_view name) {
-    const auto found = by_name_.find(name);
-    if (found != by_name_.end()) return found->second;
-    warn(fmt::format("material {} is not in any library that was read; default grey", name));
-    return by_name_.emplace(std::string(name), default_material()).first->second;
-  }
-
-  uint32_t default_material() {
-    if (default_ == kNoIndex) {
-      default_ = static_cast<uint32_t>(mesh_.materials.size());
-      mesh_.materials.emplace_back();
-    }
-    return default_;
-  }
-
-  /// An error once an image was wanted and none can be read: no fault of the file, so no case for plain colours.
-  const Result<void>& ready() const { return ready_; }
-
- private:
-  void warn(std::string text) { mesh_.warnings.push_back(std::move(text)); }
-
-  static std::string clean(std::string_view name) {
-    std::string text(name);
-    std::replace(text.begin(), text.end(), '\\', '/');  // as exporters on Windows write it
-    return text;
-  }
-
-  /// The file is part of the source, whether it is there or not.
-  Result<std::vector<unsigned char>> read_noted_file(const fs::path& path) {
-    auto bytes = read_file(path);
-    const fs::path relative = path.lexically_relative(folder_);
-    mesh_.source_files.push_back(
-        {(relative.empty() ? path : relative).generic_string(), bytes ? hash_values<unsigned char>(*bytes) : 0});
-    return bytes;
-  }
-
-  bool load_file(const fs::path& path) {
-    auto bytes = read_noted_file(path);
-    if (!bytes) bytes = read_noted_file(path.string() + ".gz");
-    if (!bytes) return false;
-    const std::string text(bytes->begin(), bytes->end());
-    std::istringstream stream(text);
-    std::map<std::string, int> names;
-    std::vector<tinyobj::material_t> materials;
-    std::string warnings, errors;
-    tinyobj::LoadMtl(&names, &materials, &stream, &warnings, &errors);
-    if (!errors.empty()) warn(fmt::format("{}: {}", path.string(), errors.substr(0, errors.find('\n'))));
-
-    const bool is_blender = text.substr(0, 200).find("Blender") != std::string::npos;
-    for (const auto& material : materials) {
-      by_name_[material.name] = static_cast<uint32_t>(mesh_.materials.size());
-      mesh_.materials.push_back(convert(material, path.parent_path(), is_blender));
-    }
-    return true;
-  }
-
-  static vec3 to_vec3(const tinyobj::real_t (&v)[3]) {
-    vec3 out;
-    for (int c = 0; c < 3; ++c) out[c] = std::isfinite(v[c]) ? std::clamp(static_cast<float>(v[c]), 0.0f, 1.0f) : 0.0f;
-    return out;
-  }
-
-  SourceMaterial convert(const tinyobj::material_t& mtl, const fs::path& folder, bool is_blender) {
-    SourceMaterial out;
-    out.base_color = to_vec3(mtl.diffuse);
-    out.alpha = std::isfinite(mtl.dissolve) ? std::clamp(static_cast<float>(mtl.dissolve), 0.0f, 1.0f) : 1.0f;
-    set_specular(mtl, is_blender, out);
-    if (!mtl.alpha_texname.empty()) {
-      out.alpha_map = texture(mtl.alpha_texname, mtl.alpha_texopt, folder, TextureUse::Mask);
-      out.is_masked = bool(out.alpha_map);
-    } else if (out.alpha < 1.0f) {
-      out.is_masked = true;
-      warn(
-          fmt::format("material {}: dissolve {} is cut at 0.5, there is no partial transparency", mtl.name, out.alpha));
-    }
-    if (!mtl.diffuse_texname.empty()) {
-      out.base_color_map = texture(mtl.diffuse_texname, mtl.diffuse_texopt, folder, TextureUse::Color);
-    }
-    const auto& tf = mtl.transmittance;
-    if (mtl.illum >= 4 && mtl.illum != 5 && mtl.illum != 8 && tf[0] + tf[1] + tf[2] > 0) {
-      warn(fmt::format("material {}: transmission filter (Tf) is ignored", mtl.name));
-    }
-    return out;
-  }
-
-  /// Pr and Pm (the PBR extension) say it directly. Otherwise Blender writes its specular slider as Ks, F0 = 0.08 Ks,
-  /// and Ns = 1000 (1 - roughness)^2; other programs mean Phong's reflectance and exponent, alpha^2 = 2 / (Ns + 2)
-  /// [Walter et al. 2007], where alpha = roughness^2. illum 1 has no highlight.
-  static void set_specular(const tinyobj::material_t& mtl, bool is_blender, SourceMaterial& out) {
-    const vec3 ks = to_vec3(mtl.specular);
-    const float ns = std::isfinite(mtl.shininess) ? std::clamp(static_cast<float>(mtl.shininess), 0.0f, 1e6f) : 0.0f;
-    const bool is_pbr = mtl.roughness > 0 || mtl.metallic > 0;
-    if (is_pbr) {
-      out.roughness = std::clamp(static_cast<float>(mtl.roughness), 0.0f, 1.0f);
-      out.metallic = std::clamp(static_cast<float>(mtl.metallic), 0.0f, 1.0f);
-      out.dielectric_f0 = vec3(0.04f);
-    } else if (mtl.illum == 1) {
-      out.dielectric_f0 = vec3(0.0f);
-    } else if (is_blender) {
-      out.roughness = 1.0f - std::sqrt(std::min(ns, 1000.0f) / 1000.0f);
-      out.dielectric_f0 = vec3(0.08f * (ks.x + ks.y + ks.z) / 3.0f);
-    } else {
-      out.roughness = std::pow(2.0f / (ns + 2.0f), 0.25f);
-      out.dielectric_f0 = ks;
-    }
-  }
-
-  SourceTexture texture(const std::string& name, const tinyobj::texture_option_t& option, const fs::path& folder,
-                        TextureUse use) {
-    const fs::path path = folder / clean(name);
-    SourceTexture out;
-    const auto key = std::make_pair(path.string(), use);
-    const auto found = images_.find(key);
-    if (found != images_.end()) {
-      out.image = found->second;
-    } else {
-      (void)read_noted_file(path);
-      auto image = read_texture(path, use);
-      if (image) {
-        out.image = std::make_shared<const Texture>(std::move(*image));
-      } else {
-        if (image.error().code == ErrorCode::Io) ready_ = tl::unexpected(image.error());
-        warn(fmt::format("texture: {}; the plain colour is used", image.error().message));
-      }
-      images_.emplace(key, out.image);
-    }
-    if (option.clamp) out.wrap_u = out.wrap_v = Wrap::Clamp;
-    if (option.scale[0] != 1 || option.scale[1] != 1 || option.origin_offset[0] != 0 || option.origin_offset[1] != 0) {
-      warn(fmt::format("texture {}: the options -s and -o are ignored", name));
-    }
-    return out;
-  }
-
-  fs::path folder_;
-  SourceMesh& mesh_;
-  std::map<std::string, uint32_t, std::less<>> by_name_;
-  std::map<std::pair<std::string, TextureUse>, std::shared_ptr<const Texture>> images_;
-  uint32_t default_ = kNoIndex;
-  Result<void> ready_;
-};
-
 class ObjReader {
  public:
   ObjReader(std::string_view text, const fs::path& path)
-      : text_(text), name_(path.string()), materials_(path.parent_path(), mesh_) {}
+      : text_(without_byte_order_mark(text)), name_(path.string()), materials_(path.parent_path(), mesh_) {}
 
   Result<SourceMesh> read() {
     while (!text_.at_end()) read_line();
-    if (!materials_.ready()) return tl::unexpected(materials_.ready().error());
+    FARFIELD_TRY(materials_.finish());
     if (mesh_.corner_count() > UINT32_MAX) {
       return make_error(ErrorCode::Unsupported, fmt::format("{}: more than 2^32 face corners", name_));
     }
@@ -319,6 +160,20 @@ class ObjReader {
       // NaN marks a corner without texture coordinate; the averages know it.
       mesh_.corner_uv[i] = uv < uvs_.size() ? uvs_[uv] : vec2(std::numeric_limits<float>::quiet_NaN());
     }
+    transform_uvs();
+  }
+
+  /// By -s and -o of each face's textures. OBJ's v points up.
+  void transform_uvs() {
+    for (size_t face = 0; face < mesh_.face_count(); ++face) {
+      const auto& transform = materials_.uv_transform(mesh_.face_material[face]);
+      if (transform.scale == vec2(1.0f) && transform.offset == vec2(0.0f)) continue;
+      for (uint32_t i = mesh_.face_begin[face]; i < mesh_.face_begin[face + 1]; ++i) {
+        vec2& uv = mesh_.corner_uv[i];
+        uv = vec2(uv.x, 1 - uv.y) * transform.scale + transform.offset;
+        uv.y = 1 - uv.y;
+      }
+    }
   }
 
   void attach_colors() {
@@ -327,8 +182,7 @@ class ObjReader {
     mesh_.corner_color.reserve(mesh_.corner_count());
     for (const uint32_t vertex : mesh_.corner_position) mesh_.corner_color.emplace_back(colors_[vertex], 1.0f);
     // Without a material the colour is the albedo itself, not a tint of the default grey.
-    if (mesh_.materials.size() == 1 && material_ == materials_.default_material())
-      mesh_.materials[0].base_color = vec3(1.0f);
+    if (mesh_.materials.size() == 1 && !materials_.is_defined(0)) mesh_.materials[0].base_color = vec3(1.0f);
   }
 
   TextCursor text_;

@@ -82,4 +82,9 @@ class TextCursor {
   const char* end_;
 };
 
+/// UTF-8 text without the mark that some editors on Windows put first.
+inline std::string_view without_byte_order_mark(std::string_view text) {
+  return text.starts_with("\xef\xbb\xbf") ? text.substr(3) : text;
+}
+
 }  // namespace farfield

@@ -3,7 +3,7 @@
 # without it: those packages are made unfindable, so that looking for one of them as REQUIRED stops the configuration.
 include(${CMAKE_CURRENT_LIST_DIR}/run.cmake)
 
-set(bake_packages ZLIB TinyGLTF tinyobjloader)
+set(bake_packages ZLIB TinyGLTF)
 set(tool_packages Imath OpenEXR CLI11)
 set(test_packages GTest benchmark)
 

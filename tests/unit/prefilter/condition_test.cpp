@@ -89,7 +89,7 @@ TEST(ImportObj, PhongAndPbrMaterialsOfOtherPrograms) {
   ASSERT_TRUE(asset) << asset.error().message;
   const auto& m = asset->surface.materials;
   ASSERT_EQ(m.size(), 3u);
-  expect_near(m[0].specular, vec3(0.3f));
+  expect_near(m[0].specular, 0.04f * vec3(0.3f));  // a strength, no reflectance
   EXPECT_NEAR(m[0].roughness2, 2.0 / 32, 1e-5);
   expect_near(m[1].specular, vec3(1, 0, 0));
   expect_near(m[1].diffuse, vec3(0.0f));

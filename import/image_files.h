@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// The images that OBJ + MTL and PLY files name: each read once, noted as part of the source.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "import/source_mesh.h"
+
+namespace farfield {
+
+/// One thread at a time. `mesh` takes warnings and source_files; paths in those are relative to `folder`.
+class ImageFiles {
+ public:
+  ImageFiles(std::filesystem::path folder, SourceMesh& mesh) : folder_(std::move(folder)), mesh_(mesh) {}
+
+  /// The bytes of a file that is part of the source, whether it is there or not. Errors: those of read_file().
+  Result<std::vector<unsigned char>> read_noted(const std::filesystem::path& path);
+
+  /// The image that a file in `folder` names; null, with a warning, when it cannot be had: the plain colour then
+  /// stands alone. A path of another computer is looked for by its last part.
+  std::shared_ptr<const Texture> read(const std::filesystem::path& folder, std::string_view name, TextureUse use);
+
+  /// An error once an image was wanted and none can be read: no fault of the file, so no case for plain colours.
+  const Result<void>& ready() const { return ready_; }
+
+ private:
+  std::filesystem::path folder_;
+  SourceMesh& mesh_;
+  std::map<std::pair<std::string, TextureUse>, std::shared_ptr<const Texture>> images_;
+  Result<void> ready_;
+};
+
+/// A file name as exporters on Windows write it, with the slashes of this system.
+std::string with_slashes(std::string_view name);
+
+}  // namespace farfield
