@@ -163,15 +163,15 @@ void MaterialLibraries::set_alpha(const Entry& entry, SourceMaterial& out) {
   }
   if (mtl.map_d) {
     out.alpha_map = texture(entry, mtl.map_d, TextureUse::Mask);
-    out.is_masked = bool(out.alpha_map);
-    if (out.is_masked && out.alpha < out.alpha_cutoff) {
+    if (out.alpha_map) out.alpha_mode = AlphaMode::Mask;
+    if (out.alpha_mode != AlphaMode::Opaque && out.alpha < out.alpha_cutoff) {
       warn(fmt::format("material {}: dissolve {} beside an opacity map would leave nothing; the map alone is used",
                        mtl.name, out.alpha));
       out.alpha = 1;
     }
   }
-  if (out.alpha < 1.0f && !out.is_masked) {
-    out.is_masked = true;
+  if (out.alpha < 1.0f && out.alpha_mode == AlphaMode::Opaque) {
+    out.alpha_mode = AlphaMode::Mask;
     warn(fmt::format("material {}: dissolve {} is cut at 0.5, there is no partial transparency", mtl.name, out.alpha));
   }
 }
@@ -182,7 +182,7 @@ void MaterialLibraries::set_color(const Entry& entry, SourceMaterial& out) {
   const MtlMaterial& mtl = entry.mtl;
   if (mtl.kd) out.base_color = *mtl.kd;
   if (!mtl.map_kd) return;
-  const bool may_have_mask = !mtl.map_d && !out.is_masked;
+  const bool may_have_mask = !mtl.map_d && out.alpha_mode == AlphaMode::Opaque;
   out.base_color_map = texture(entry, mtl.map_kd, may_have_mask ? TextureUse::ColorWithAlpha : TextureUse::Color);
   if (!out.base_color_map) return;
   if (!mtl.kd) out.base_color = vec3(1.0f);
@@ -192,7 +192,7 @@ void MaterialLibraries::set_color(const Entry& entry, SourceMaterial& out) {
   }
   if (!may_have_mask || out.base_color_map.image->mean().w == 1) return;
   if (is_mask(*out.base_color_map.image, out.alpha_cutoff)) {
-    out.is_masked = true;
+    out.alpha_mode = AlphaMode::Mask;
     warn(
         fmt::format("material {}: cut out by the alpha in {}, which no map_d names; save that file without alpha if it "
                     "is to be solid",
@@ -225,7 +225,7 @@ SourceTexture MaterialLibraries::texture(const Entry& entry, const MtlMap& map, 
 
 /// A file of which nothing would be left says it wrongly, as exporters do that write d for Tr.
 void MaterialLibraries::keep_what_would_vanish() {
-  const auto vanishes = [](const SourceMaterial& m) { return m.is_masked && m.alpha < m.alpha_cutoff; };
+  const auto vanishes = [](const SourceMaterial& m) { return m.alpha_mode == AlphaMode::Mask && m.alpha < m.alpha_cutoff; };
   if (mesh_.face_count() == 0) return;
   if (!std::all_of(mesh_.face_material.begin(), mesh_.face_material.end(),
                    [&](uint32_t index) { return vanishes(mesh_.materials[index]); })) {

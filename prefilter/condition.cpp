@@ -226,7 +226,7 @@ class SurfaceBuilder {
     std::vector<std::vector<MaskedTriangle>> of_material(mesh_.materials.size());
     for (size_t i = 0; i < triangles.size(); ++i) {
       const CornerTriangle& t = triangles[i];
-      if (!mesh_.materials[t.material].is_masked) continue;
+      if (mesh_.materials[t.material].alpha_mode == AlphaMode::Opaque) continue;
       MaskedTriangle masked{uv_of(t), {1, 1, 1}};
       if (!mesh_.corner_color.empty()) {
         for (int k = 0; k < 3; ++k) masked.alpha[static_cast<size_t>(k)] = mesh_.corner_color[t.corner[k]].w;

@@ -32,7 +32,7 @@ SourceMaterial masked(int n, const AlphaAt& alpha) {
     }
   }
   SourceMaterial m;
-  m.is_masked = true;
+  m.alpha_mode = AlphaMode::Mask;
   m.base_color_map = {std::make_shared<const Texture>(n, n, texels), Wrap::Clamp, Wrap::Clamp};
   return m;
 }
@@ -117,7 +117,7 @@ TEST(AlphaCut, FullAndEmptyMasksKeepOrDropTheWholeTriangle) {
 
 TEST(AlphaCut, VertexAlphaCutsWithoutAnyTexture) {
   SourceMaterial m;
-  m.is_masked = true;
+  m.alpha_mode = AlphaMode::Mask;
   const MaskedTriangle ramp{{}, {0, 1, 1}};
   const CutPattern cut = cut_by_mask(m, ramp, 32);
   EXPECT_NEAR(cut.coverage, 0.75, 1e-3);  // the corner with alpha below a half is a quarter of the area

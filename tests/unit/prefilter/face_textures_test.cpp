@@ -114,7 +114,7 @@ TEST(FaceTextures, CoarserLevelsAgreeWithTheFullImage) {
 
 TEST(FaceTextures, ColourUnderTransparentTexelsDoesNotBleedIn) {
   SourceMaterial m = textured(image(2, 1, {vec4(1, 0, 0, 1), vec4(0, 1, 0, 0)}));
-  m.is_masked = true;
+  m.alpha_mode = AlphaMode::Mask;
   const UvTriangle t = {vec2(0, 0), vec2(1, 0), vec2(1, 1)};
   expect_near(average_textures(m, t).dielectric, vec3(1, 0, 0), 1e-4f);
 }
