@@ -225,7 +225,9 @@ SourceTexture MaterialLibraries::texture(const Entry& entry, const MtlMap& map, 
 
 /// A file of which nothing would be left says it wrongly, as exporters do that write d for Tr.
 void MaterialLibraries::keep_what_would_vanish() {
-  const auto vanishes = [](const SourceMaterial& m) { return m.alpha_mode == AlphaMode::Mask && m.alpha < m.alpha_cutoff; };
+  const auto vanishes = [](const SourceMaterial& m) {
+    return m.alpha_mode == AlphaMode::Mask && m.alpha < m.alpha_cutoff;
+  };
   if (mesh_.face_count() == 0) return;
   if (!std::all_of(mesh_.face_material.begin(), mesh_.face_material.end(),
                    [&](uint32_t index) { return vanishes(mesh_.materials[index]); })) {

@@ -183,8 +183,8 @@ class MaterialReader {
     }
     const double set = std::clamp(extension_number(info, "texCoord").value_or(0), 0.0, 99.0);
     uv = uv_source(static_cast<int>(set), extensions);
-    out.base_color_map =
-        texture(static_cast<int>(index), out.alpha_mode != AlphaMode::Opaque ? TextureUse::ColorWithAlpha : TextureUse::Color);
+    out.base_color_map = texture(static_cast<int>(index),
+                                 out.alpha_mode != AlphaMode::Opaque ? TextureUse::ColorWithAlpha : TextureUse::Color);
   }
 
   void set_transmission(const tinygltf::Material& source, SourceMaterial& out) {
@@ -208,7 +208,8 @@ class MaterialReader {
     const auto& rough = pbr.metallicRoughnessTexture;
     if (color.index >= 0) {
       uv = uv_source(color.texCoord, color.extensions);
-      out.base_color_map = texture(color.index, out.alpha_mode != AlphaMode::Opaque ? TextureUse::ColorWithAlpha : TextureUse::Color);
+      out.base_color_map =
+          texture(color.index, out.alpha_mode != AlphaMode::Opaque ? TextureUse::ColorWithAlpha : TextureUse::Color);
     }
     if (rough.index < 0) return;
     const UvSource rough_uv = uv_source(rough.texCoord, rough.extensions);
