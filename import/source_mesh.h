@@ -10,13 +10,12 @@
 
 #include "base/hash.h"
 #include "base/result.h"
+#include "base/surface_material.h"
 #include "base/vec.h"
 #include "farfield/material.h"
 #include "import/texture.h"
 
 namespace farfield {
-
-enum class Wrap { Repeat, Clamp, Mirror };
 
 /// An image and how it continues outside [0, 1]^2.
 struct SourceTexture {
@@ -26,34 +25,8 @@ struct SourceTexture {
   explicit operator bool() const { return image != nullptr; }
 };
 
-enum class AlphaMode : uint8_t {
-  Opaque,
-  Mask,   ///< there where alpha >= alpha_cutoff, not there elsewhere
-  Blend,  ///< alpha is the share of the light that meets it
-};
-
-/// A material as glTF's metallic-roughness model says it; the other formats are mapped to it by their readers.
-/// Defaults are those of a face without any material: Blender's grey, without a specular lobe.
-struct SourceMaterial {
-  std::string name;                       ///< as the file has it; may be empty
-  vec3 base_color{0.8f};                  ///< linear; multiplies texture and vertex colour
-  float alpha = 1;                        ///< multiplies the textures' and the vertex colours' alpha
-  float metallic = 0;                     ///< multiplies metallic_roughness.b
-  float roughness = 1;                    ///< multiplies metallic_roughness.g
-  vec3 dielectric_f0{0.0f};               ///< reflectance at normal incidence of the part that is not metal
-  float diffuse_transmission = 0;         ///< share of the diffuse light that goes through
-  vec3 diffuse_transmission_color{1.0f};  ///< linear
-  SourceTexture base_color_map;           ///< linear RGB, alpha (1 where the material ignores it)
-  SourceTexture metallic_roughness_map;   ///< g: roughness, b: metallic
-  SourceTexture alpha_map;                ///< OBJ's map_d: its alpha channel multiplies
-  AlphaMode alpha_mode = AlphaMode::Opaque;
-  float alpha_cutoff = 0.5f;
-  SourceTexture normal_map;     ///< tangent space, as stored: (r, g, b) in [0, 1] is 2 (r, g, b) - 1
-  float normal_scale = 1;       ///< multiplies x and y of normal_map
-  vec3 emission{0.0f};          ///< linear radiance, may exceed 1
-  SourceTexture emission_map;   ///< linear RGB; multiplies emission
-  float thin_transmission = 0;  ///< share of the light that goes straight through (KHR_transmission): opacity
-};
+/// The other formats are mapped to glTF's model by their readers.
+using SourceMaterial = SurfaceMaterial<SourceTexture>;
 
 struct SourceMesh {
   std::vector<dvec3> positions;

@@ -9,9 +9,10 @@
 namespace farfield {
 
 FaceMaterial mix(const FaceMaterial& a, float factor_a, const FaceMaterial& b, float factor_b) {
-  return {a.sggx * factor_a + b.sggx * factor_b, a.diffuse * factor_a + b.diffuse * factor_b,
-          a.specular * factor_a + b.specular * factor_b, a.transmission * factor_a + b.transmission * factor_b,
-          a.roughness2 * factor_a + b.roughness2 * factor_b};
+  const auto mean = [&](auto FaceMaterial::*channel) { return a.*channel * factor_a + b.*channel * factor_b; };
+  return {mean(&FaceMaterial::sggx),     mean(&FaceMaterial::shading_sggx), mean(&FaceMaterial::diffuse),
+          mean(&FaceMaterial::specular), mean(&FaceMaterial::transmission), mean(&FaceMaterial::roughness2),
+          mean(&FaceMaterial::opacity),  mean(&FaceMaterial::emission)};
 }
 
 void filter_materials(std::span<const double> area_before, std::span<const double> area_after,

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a metallic-roughness material and what its maps say at a place, or on average over one, to how it reflects
+// (docs/decisions/0006). The bake and close-ups both go through here, so they agree.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/surface_material.h"
+#include "base/vec.h"
+#include "farfield/material.h"
+
+namespace farfield {
+
+/// What a material's maps say, each mean weighted by alpha where there is alpha. Without the factors of the material
+/// and the vertex colour, which come in afterwards. The defaults are those of a material without maps.
+struct MapMeans {
+  vec3 dielectric{1.0f};  ///< base colour times (1 - metallic)
+  vec3 metal{0.0f};       ///< base colour times metallic
+  float metallic = 0;
+  float roughness2 = 1;  ///< roughness^4, which is alpha^2 of GGX
+  float opacity = 1;     ///< coverage by mask, or alpha; the material's own alpha included
+  vec3 emission{1.0f};   ///< of the emission map
+  vec3 normal{0, 0, 1};  ///< mean of unit normals in the tangent frame: shorter where they spread
+};
+
+/// The means of a material whose maps are missing or not looked at.
+template <typename Map>
+MapMeans means_without_maps(const SurfaceMaterial<Map>& material) {
+  MapMeans means;
+  means.dielectric = vec3(1 - material.metallic);
+  means.metal = vec3(material.metallic);
+  means.metallic = material.metallic;
+  means.roughness2 = std::pow(material.roughness, 4.0f);
+  if (material.alpha_mode == AlphaMode::Mask) means.opacity = material.alpha >= material.alpha_cutoff ? 1.0f : 0.0f;
+  if (material.alpha_mode == AlphaMode::Blend) means.opacity = std::clamp(material.alpha, 0.0f, 1.0f);
+  return means;
+}
+
+/// `color`: the mean vertex colour, linear. What the specular lobe takes at normal incidence is left out of the diffuse
+/// one, so diffuse + transmission + specular <= 1 per channel.
+template <typename Map>
+MaterialSample material_sample(const SurfaceMaterial<Map>& material, const MapMeans& means, const vec3& color) {
+  const vec3 base = glm::clamp(material.base_color * color, vec3(0.0f), vec3(1.0f));
+  MaterialSample out;
+  out.specular = glm::clamp(material.dielectric_f0 * (1 - means.metallic) + base * means.metal, vec3(0.0f), vec3(1.0f));
+  const vec3 room = 1.0f - out.specular;
+  const float through = material.diffuse_transmission;
+  out.diffuse = glm::min(base * means.dielectric * (1 - through) * room, room);
+  out.transmission =
+      glm::min(material.diffuse_transmission_color * (through * (1 - means.metallic)) * room, room - out.diffuse);
+  out.roughness = std::sqrt(std::sqrt(std::clamp(means.roughness2, 0.0f, 1.0f)));
+  out.opacity = std::clamp(means.opacity, 0.0f, 1.0f);
+  out.emission = glm::max(material.emission * means.emission, vec3(0.0f));
+  out.normal = means.normal;
+  if (material.thin_transmission > 0) {
+    // A pane: of what does not reflect at its two sides a share goes on as if it were not there; rays have no colour,
+    // so it goes as grey. What does not pass reflects as much more as fewer rays meet it.
+    const vec3 passes = vec3(material.thin_transmission) * glm::max(1.0f - 2.0f * out.specular, vec3(0.0f)) * base;
+    const float pane = std::max(1 - (passes.x + passes.y + passes.z) / 3, 1e-3f);
+    out.diffuse = glm::min(out.diffuse * ((1 - material.thin_transmission) / pane), vec3(1.0f));
+    out.specular = glm::min(2.0f * out.specular / pane, vec3(1.0f));
+    out.diffuse = glm::min(out.diffuse, 1.0f - out.specular);
+    out.opacity *= pane;
+  }
+  return out;
+}
+
+}  // namespace farfield
