@@ -197,6 +197,7 @@ FilmSample PathTracer::trace(const CameraRay& camera_ray, uint64_t path_key, flo
       result.footprint = vertex.footprint;
       result.lod_volume = vertex.kind == Interaction::Kind::Volume ? 1.0f : 0.0f;
     }
+    if (max_component(vertex.emission) > 0) add(vertex.emission);
     if (++depth_ > options_.max_depth) break;
     add_sampled_environment(vertex, ray);
     add_point_lights(vertex, ray);

@@ -17,6 +17,7 @@
 #include "cache/level_file.h"
 #include "tests/support/files.h"
 #include "tests/support/random_unit.h"
+#include "tests/support/source_surfaces.h"
 #include "tests/support/surfaces.h"
 
 namespace farfield {
@@ -55,11 +56,9 @@ BakeOptions small_options() {
 
 /// A ball of 2 * 32 * 16 triangles inside a cloud of leaves: surface at fine levels, leaves that become volume.
 ImportedAsset ball_in_leaves() {
-  ImportedAsset asset;
   test::LeafCloud cloud;
   cloud.count = 1500;
-  asset.surface = test::leaf_cloud(cloud);
-  Surface& surface = asset.surface;
+  Surface surface = test::leaf_cloud(cloud);
   constexpr uint32_t kAround = 32, kUp = 16;
   const auto first = static_cast<uint32_t>(surface.positions.size());
   const auto point = [](float theta, float phi) {
@@ -90,19 +89,18 @@ ImportedAsset ball_in_leaves() {
     }
     add(at(kUp - 1, j), last, at(kUp - 1, j + 1));
   }
-  asset.source_hash = 77;
-  return asset;
+  return test::asset_of(surface, 77);
 }
 
-ImportedAsset two_triangles() {
-  ImportedAsset asset;
-  asset.surface.positions = {vec3(0), vec3(4, 0, 0), vec3(4, 4, 0), vec3(0, 4, 0)};
-  asset.surface.triangles = {uvec3(0, 1, 2), uvec3(0, 2, 3)};
+ImportedAsset two_triangles(float grey = 0.5f) {
+  Surface surface;
+  surface.positions = {vec3(0), vec3(4, 0, 0), vec3(4, 4, 0), vec3(0, 4, 0)};
+  surface.triangles = {uvec3(0, 1, 2), uvec3(0, 2, 3)};
   FaceMaterial material;
   material.sggx = SymMat3::outer(vec3(0, 0, 1));
-  material.diffuse = vec3(0.5f);
-  asset.surface.materials.assign(2, material);
-  return asset;
+  material.diffuse = vec3(grey);
+  surface.materials.assign(2, material);
+  return test::asset_of(surface);
 }
 
 /// Every file below a folder, by relative name.
@@ -386,9 +384,7 @@ TEST_F(Bake, SaysItsWarningsAgainWhenUpToDateAndTheyDoNotNameTheFolder) {
 TEST_F(Bake, BakesAnewWhenAFileIsOfAnotherBake) {
   ASSERT_TRUE(bake(two_triangles(), "thing", out(), small_options()).has_value());
   const auto before = files_of(out());
-  ImportedAsset darker = two_triangles();
-  for (FaceMaterial& material : darker.surface.materials) material.diffuse = vec3(0.1f);
-  ASSERT_TRUE(bake(std::move(darker), "thing", folder_ / "darker", small_options()).has_value());
+  ASSERT_TRUE(bake(two_triangles(0.1f), "thing", folder_ / "darker", small_options()).has_value());
   fs::copy_file(folder_ / "darker" / "level_0.ffl", out() / "level_0.ffl", fs::copy_options::overwrite_existing);
   ASSERT_EQ(fs::file_size(out() / "level_0.ffl"), before.at("level_0.ffl").size());
 
@@ -453,11 +449,9 @@ TEST_F(Bake, DoesNotVoxeliseWhatCannotSaveAnything) {
   options.measure_resident = [](const LevelView& level) {
     return Result<LevelCost>(LevelCost{level.header.level == 0 ? 100000u : 1000u >> level.header.level, 1});
   };
-  ImportedAsset specks;  // all smaller than a voxel, in most of some 5000 bricks
-  test::LeafCloud cloud;
-  cloud.leaf_size = 0.006f;
-  specks.surface = test::leaf_cloud(cloud);
-  const auto report = bake(std::move(specks), "specks", out(), options);
+  test::LeafCloud specks;  // all smaller than a voxel, in most of some 5000 bricks
+  specks.leaf_size = 0.006f;
+  const auto report = bake(test::asset_of(test::leaf_cloud(specks)), "specks", out(), options);
   ASSERT_TRUE(report.has_value());
   EXPECT_EQ(report->levels[1].voxelized_triangles, 8000u);
   EXPECT_TRUE(report->levels[1].worthless);
