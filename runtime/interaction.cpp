@@ -83,7 +83,7 @@ struct NarrowNormals {
   float roughness2;
 };
 std::optional<NarrowNormals> narrow_normals(const SymMat3& s, const vec3& start) {
-  constexpr float kNarrow = 0.9f;  // of the trace: within about 18 degrees
+  constexpr float kNarrow = 0.55f;  // of the trace: within about 18 degrees
   const float trace = s.trace();
   if (!(trace > 0)) return {};
   vec3 normal = start;
