@@ -46,11 +46,11 @@ std::string make_fingerprint(const RenderOptions& options, std::span<const fs::p
   const TraceOptions& trace = options.trace;
   std::string text = fmt::format(
       "size {}x{} spp {} seed {} depth {} roulette {} clamp {} strategy {} transparent {} budget {} scale {} blend {} "
-      "full {} exposure {} camera {} fps {} scene {} environment {} assets",
+      "full {} exposure {} camera {} fps {} scene {} environment {} sky {} assets",
       options.width, options.height, trace.samples_per_pixel, trace.seed, trace.max_depth, trace.roulette_depth,
       trace.clamp_indirect, static_cast<int>(trace.strategy), trace.transparent, options.budget_bytes,
       options.lod_scale, static_cast<int>(options.blend), options.full_detail, options.exposure_stops, options.camera,
-      options.frames_per_second, identity(options.scene), identity(options.environment));
+      options.frames_per_second, identity(options.scene), identity(options.environment), options.sky);
   for (const fs::path& folder : asset_folders)
     if (!folder.empty()) text += fmt::format(" {}:{}", folder.filename().string(), to_hex(manifest_hash(folder)));
   return text;

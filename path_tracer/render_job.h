@@ -30,7 +30,8 @@ struct RenderOptions {
   float lod_scale = 1.0f;
   Blend blend = Blend::Dissolve;
   bool full_detail = false;           ///< level 0 only, from assets baked with --source-only
-  std::filesystem::path environment;  ///< EXR; empty: sun and sky, the sun from the scene's directional light
+  std::filesystem::path environment;  ///< EXR or Radiance HDR; empty: sun and sky, see make_lights()
+  bool sky = true;                    ///< false: without an environment there is no light but the scene's own
   float exposure_stops = 0;           ///< of the PNG previews
   uint32_t finest_grid = 512;         ///< of assets that have to be baked first
   /// Command that bakes: called as BAKER bake SCENE -o DIR --mesh N ... Empty: this very program.

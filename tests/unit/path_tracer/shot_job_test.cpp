@@ -193,6 +193,29 @@ TEST_F(Shot, FrameDoesNotDependOnTheFramesBefore) {
   EXPECT_EQ(test::read_bytes(folder_.path() / "alone.exr"), test::read_bytes(out() / "frame_0024.exr"));
 }
 
+TEST_F(Shot, FramesPerSecondSayWhatTimeAFrameShows) {
+  const auto camera_of = [&](int frame) {
+    EXPECT_TRUE(render_frame(options_, frame, folder_.path() / "frame.exr"));
+    return std::get<vec3>(read_exr(folder_.path() / "frame.exr")->metadata.at("camera.position"));
+  };
+  EXPECT_EQ(camera_of(12), vec3(0, 0, 102));  // half a second at the default of 24
+  options_.frames_per_second = 48;
+  EXPECT_EQ(camera_of(24), vec3(0, 0, 102));
+  options_.frames_per_second = 6;
+  EXPECT_EQ(camera_of(3), vec3(0, 0, 102));
+}
+
+TEST_F(Shot, WithoutSkyItIsDark) {
+  options_.sky = false;
+  std::vector<std::string> warnings;
+  options_.warning = [&](const std::string& line) { warnings.push_back(line); };
+  ASSERT_TRUE(render_frame(options_, 0, folder_.path() / "dark.exr"));
+  ASSERT_EQ(warnings.size(), 1u);
+  const auto file = read_exr(folder_.path() / "dark.exr");
+  for (int x = 0; x < 48; ++x)
+    for (int c = 0; c < 3; ++c) EXPECT_EQ(file->image.pixel(x, 16)[c], 0.0f);
+}
+
 TEST_F(Shot, CancelKeepsFinishedFramesAndTheRecord) {
   std::atomic<bool> cancel{false};
   options_.job.cancel = &cancel;
