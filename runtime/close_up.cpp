@@ -141,8 +141,8 @@ float CloseUp::opacity(const TracedLevel& level, const SurfacePoint& point) cons
   std::optional<float> opacity;
   if (function_) {
     opacity = ask_host(place, true).opacity;
-  } else if (place.at.material < materials_.size()) {
-    opacity = opacity_at(materials_[place.at.material], place);
+  } else if (const Material* material = varying_material(level.view, place)) {
+    opacity = opacity_at(*material, place);
   }
   return opacity ? *opacity : unpack_unorm8(level.view.face_opacity[point.face]);
 }
@@ -152,10 +152,8 @@ std::optional<CloseUpSample> CloseUp::sample(const LevelView& level, const Surfa
   std::optional<MaterialSample> material;
   if (function_) {
     material = ask_host(place, false);
-  } else if (place.at.material < materials_.size()) {
-    const Material& of = materials_[place.at.material];
-    const bool is_uniform = !of.has_maps && level.shading_color.empty();
-    if (!is_uniform && (!of.has_maps || place.has_uv)) material = sample_at(of, place);
+  } else if (const Material* varying = varying_material(level, place)) {
+    material = sample_at(*varying, place);
   }
   if (!material) return {};
   CloseUpSample out{*material, place.at.normal};
@@ -168,6 +166,14 @@ std::optional<CloseUpSample> CloseUp::sample(const LevelView& level, const Surfa
     out.normal = TangentFrame(place.positions, place.uvs).bend(smooth, material->normal);
   }
   return out;
+}
+
+/// The material of a place, if it says more there than what the face is on average.
+const CloseUp::Material* CloseUp::varying_material(const LevelView& level, const Place& place) const {
+  if (place.at.material >= materials_.size()) return nullptr;
+  const Material& material = materials_[place.at.material];
+  const bool is_varying = material.has_maps ? place.has_uv : !level.shading_color.empty();
+  return is_varying ? &material : nullptr;
 }
 
 /// Nothing: a map that is needed cannot be read.

@@ -60,6 +60,7 @@ class CloseUp final : public SurfaceLook {
   };
   struct Place;
 
+  const Material* varying_material(const LevelView& level, const Place& place) const;
   std::optional<float> opacity_at(const Material& material, const Place& place) const;
   std::optional<MaterialSample> sample_at(const Material& material, const Place& place) const;
   MaterialSample ask_host(const Place& place, bool opacity_only) const;

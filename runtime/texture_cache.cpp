@@ -25,7 +25,9 @@ uint32_t TextureCache::add(const std::filesystem::path& file, Wrap wrap_u, Wrap 
                        fmt::format("close-ups have one colour per face: {}", module.error().message));
     }
   }
-  return lookup_ ? lookup_->add(file.string(), wrap_u, wrap_v) : 0;
+  if (!lookup_) return 0;
+  files_.push_back(file.string());
+  return lookup_->add(files_.back(), wrap_u, wrap_v);
 }
 
 uint64_t TextureCache::wanted_bytes(uint64_t budget_bytes) const {
@@ -48,7 +50,8 @@ bool TextureCache::look_up(uint32_t texture, const TextureFootprint& footprint, 
   if (!is_open_) return false;
   if (lookup_->look_up(texture, footprint, channels, values)) return true;
   messages_.report_once(said_unreadable_, Severity::Error,
-                        fmt::format("a texture cannot be read; its faces have one colour each: {}", lookup_->error()));
+                        fmt::format("{} cannot be read, its faces have one colour each; bake the asset again: {}",
+                                    files_[texture], lookup_->error()));
   return false;
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "base/texture_module.h"
@@ -35,6 +36,7 @@ class TextureCache {
  private:
   Messages& messages_;
   std::unique_ptr<TextureLookup> lookup_;
+  std::vector<std::string> files_;  ///< per texture, for messages
   bool is_open_ = false;     ///< set_bytes() has given it room
   bool is_missing_ = false;  ///< OpenImageIO's module does not load
   uint64_t texture_bytes_ = 0;
