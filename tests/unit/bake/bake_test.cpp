@@ -461,6 +461,41 @@ TEST_F(Bake, DoesNotVoxeliseWhatCannotSaveAnything) {
   open_levels(out());
 }
 
+/// A square with a texture of `side`^2 texels that varies everywhere.
+ImportedAsset textured_square(int side) {
+  std::vector<vec4> texels;
+  for (int i = 0; i < side * side; ++i) texels.emplace_back(vec3(static_cast<float>(mix64(i) % 1000) / 1000), 1);
+  SourceMesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  mesh.corner_position = {0, 1, 2, 3};
+  mesh.face_begin = {0, 4};
+  mesh.corner_uv = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  mesh.face_material = {0};
+  mesh.materials.resize(1);
+  mesh.materials[0].name = "noise";
+  mesh.materials[0].base_color_map.image = std::make_shared<const Texture>(side, side, texels);
+  return std::move(*condition(std::move(mesh), "square"));
+}
+
+TEST_F(Bake, KeepsTexturesAndStoresNoLevelThatTakesMoreThanThey) {
+  const auto report = bake(textured_square(64), "square", out(), small_options());
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  ASSERT_EQ(report->manifest.textures.size(), 1u);
+  EXPECT_EQ(report->manifest.materials.at(0).name, "noise");
+  EXPECT_EQ(report->manifest.materials[0].base_color_map.texture, 0u);
+  EXPECT_TRUE(fs::exists(out() / "texture_0.tif"));
+  uint64_t least = report->manifest.levels[0].resident_bytes + report->manifest.textures[0].cache_bytes;
+  for (size_t i = 1; i < report->manifest.levels.size(); ++i) {
+    EXPECT_LT(report->manifest.levels[i].resident_bytes, least);
+    least = report->manifest.levels[i].resident_bytes;
+  }
+  EXPECT_TRUE(bake(textured_square(64), "square", out(), small_options())->up_to_date);
+  const auto before = files_of(out());
+  std::ofstream(out() / "texture_0.tif", std::ios::app) << "x";
+  EXPECT_FALSE(bake(textured_square(64), "square", out(), small_options())->up_to_date);
+  EXPECT_EQ(files_of(out()), before);
+}
+
 TEST_F(Bake, RefusesSenselessOptions) {
   const auto code = [&](const BakeOptions& options) {
     const auto report = bake(two_triangles(), "x", out(), options);
