@@ -13,6 +13,7 @@
 #include "base/hash.h"
 #include "base/parallel.h"
 #include "base/result.h"
+#include "cache/manifest.h"
 #include "path_tracer/asset_library.h"
 #include "path_tracer/film.h"
 #include "path_tracer/process_memory.h"
@@ -99,6 +100,13 @@ void report_problems(const RenderOptions& options, const FrameReport& frame) {
         fmt::format("frame {}: {} paths were not finite and are black", frame.frame, frame.invalid_samples));
 }
 
+bool any_has_textures(const std::vector<std::filesystem::path>& folders) {
+  return std::ranges::any_of(folders, [](const std::filesystem::path& folder) {
+    const auto manifest = read_manifest(folder);  // what is wrong with it the session says
+    return manifest && !manifest->textures.empty();
+  });
+}
+
 }  // namespace
 
 Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOptions& options) {
@@ -132,7 +140,7 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
   Film film(options_.width, options_.height, {.ids = options_.cryptomatte});
   // As many threads as parallel_for uses: a default device would lift a limit on them.
   FARFIELD_TRY_LET(auto device, make_embree_device(thread_count()));
-  FARFIELD_TRY(warm_up(device.get(), film.image()));
+  FARFIELD_TRY(warm_up(device.get(), film.image(), any_has_textures(asset_folders_)));
 
   RenderReport report;
   report.assets = asset_names_;

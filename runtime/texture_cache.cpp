@@ -16,42 +16,45 @@ constexpr uint64_t kOverheadBytes = uint64_t{1} << 20;
 }  // namespace
 
 uint32_t TextureCache::add(const std::filesystem::path& file, Wrap wrap_u, Wrap wrap_v) {
-  if (!lookup_ && !is_missing_) {
-    if (const auto module = texture_module()) {
-      lookup_ = (*module)->make_lookup();
-    } else {
-      is_missing_ = true;
-      messages_.report(Severity::Warning,
-                       fmt::format("close-ups have one colour per face: {}", module.error().message));
-    }
-  }
-  if (!lookup_) return 0;
-  files_.push_back(file.string());
-  return lookup_->add(files_.back(), wrap_u, wrap_v);
+  files_.push_back({file.string(), wrap_u, wrap_v});
+  return static_cast<uint32_t>(files_.size() - 1);
 }
 
 uint64_t TextureCache::wanted_bytes(uint64_t budget_bytes) const {
-  if (!lookup_ || texture_bytes_ == 0) return 0;
+  if (texture_bytes_ == 0 || is_missing_) return 0;
   return std::min(texture_bytes_, std::max(budget_bytes / kLargestShare, kSmallestTextureCache)) + kOverheadBytes;
 }
 
 void TextureCache::set_bytes(uint64_t bytes) {
-  if (!lookup_) return;
-  const bool was_open = is_open_;
-  is_open_ = bytes > 0;
-  if (is_open_) {
+  if (bytes > 0 && !lookup_) open();
+  const bool had_room = has_room_;
+  has_room_ = bytes > 0 && lookup_;
+  if (has_room_) {
+    for (; known_files_ < files_.size(); ++known_files_) {
+      const File& file = files_[known_files_];
+      lookup_->add(file.path, file.wrap_u, file.wrap_v);
+    }
     lookup_->set_cache_bytes(std::max(bytes - std::min(bytes, kOverheadBytes), kSmallestTextureCache));
-  } else if (was_open) {
+  } else if (had_room) {
     lookup_->clear();
   }
 }
 
+void TextureCache::open() {
+  if (const auto module = texture_module()) {
+    lookup_ = (*module)->make_lookup();
+  } else if (!is_missing_) {
+    is_missing_ = true;
+    messages_.report(Severity::Warning, fmt::format("close-ups have one colour per face: {}", module.error().message));
+  }
+}
+
 bool TextureCache::look_up(uint32_t texture, const TextureFootprint& footprint, int channels, float* values) const {
-  if (!is_open_) return false;
+  if (!has_room_) return false;
   if (lookup_->look_up(texture, footprint, channels, values)) return true;
   messages_.report_once(said_unreadable_, Severity::Error,
                         fmt::format("{} cannot be read, its faces have one colour each; bake the asset again: {}",
-                                    files_[texture], lookup_->error()));
+                                    files_[texture].path, lookup_->error()));
   return false;
 }
 

@@ -39,7 +39,8 @@ SourceSurface square() {
 
 double area_of(const Surface& s, size_t f) {
   const uvec3& t = s.triangles[f];
-  return 0.5 * glm::length(glm::cross(dvec3(s.positions[t.y] - s.positions[t.x]), dvec3(s.positions[t.z] - s.positions[t.x])));
+  return 0.5 * glm::length(
+                   glm::cross(dvec3(s.positions[t.y] - s.positions[t.x]), dvec3(s.positions[t.z] - s.positions[t.x])));
 }
 
 double total_area(const Surface& s) {
@@ -67,7 +68,8 @@ double smallest_angle(const Surface& s) {
   double smallest = 180;
   for (const uvec3& t : s.triangles) {
     for (int k = 0; k < 3; ++k) {
-      const vec3 a = s.positions[t[(k + 1) % 3]] - s.positions[t[k]], b = s.positions[t[(k + 2) % 3]] - s.positions[t[k]];
+      const vec3 a = s.positions[t[(k + 1) % 3]] - s.positions[t[k]],
+                 b = s.positions[t[(k + 2) % 3]] - s.positions[t[k]];
       smallest = std::min(smallest, std::acos(double(glm::dot(glm::normalize(a), glm::normalize(b)))) * 180 / M_PI);
     }
   }
@@ -97,7 +99,8 @@ TEST(Resolve, SplitsWhereATextureVariesAndOnlyThere) {
   double mean = 0;
   for (size_t f = 0; f < s.triangles.size(); ++f) {
     mean += area_of(s, f) * s.materials[f].diffuse.x;
-    const vec3 middle = (s.positions[s.triangles[f].x] + s.positions[s.triangles[f].y] + s.positions[s.triangles[f].z]) / 3.0f;
+    const vec3 middle =
+        (s.positions[s.triangles[f].x] + s.positions[s.triangles[f].y] + s.positions[s.triangles[f].z]) / 3.0f;
     if (middle.x < 0.2f && middle.y < 0.2f) {
       EXPECT_LT(area_of(s, f), 1.01 / 32 / 32);
     }
@@ -118,7 +121,8 @@ TEST(Resolve, SharesSplitsWithNeighboursOfOtherMaterials) {
   SourceSurface source = square();
   source.materials.resize(2);
   source.material = {0, 1};
-  source.materials[0].base_color_map.image = image(64, [](int x, int) { return vec4(vec3(x / 8 % 2 ? 1.0f : 0.0f), 1); });
+  source.materials[0].base_color_map.image =
+      image(64, [](int x, int) { return vec4(vec3(x / 8 % 2 ? 1.0f : 0.0f), 1); });
   const auto resolved = resolve(source, 1.0f / 16);
   ASSERT_TRUE(resolved);
   EXPECT_NEAR(border_length(resolved->surface), 4, 1e-5);
@@ -159,7 +163,8 @@ TEST(Resolve, SmoothNormalsSplitCurvedFacesAndStayInTheMatrix) {
   SourceSurface source = square();
   const float s = std::sqrt(0.5f);
   for (const uvec3& t : source.triangles) {
-    for (int k = 0; k < 3; ++k) source.corner_normal.push_back(source.positions[t[k]].x > 0 ? vec3(s, 0, s) : vec3(-s, 0, s));
+    for (int k = 0; k < 3; ++k)
+      source.corner_normal.push_back(source.positions[t[k]].x > 0 ? vec3(s, 0, s) : vec3(-s, 0, s));
   }
   const auto coarse = resolve(source, 10);
   ASSERT_TRUE(coarse);
