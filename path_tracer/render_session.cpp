@@ -3,8 +3,8 @@
 
 #include <chrono>
 
+#include "base/process_memory.h"
 #include "base/result.h"
-#include "path_tracer/process_memory.h"
 
 namespace farfield {
 
