@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cascade of thesis 6.4. Level k is made from level k-1: its surface is split into macrosurface, which is
-// simplified, and sub-resolution geometry, which joins all such geometry of finer levels, in the form in which it left
-// the surface; all of it is voxelised afresh at r_k.
+// Level 0 is the source. The first level that saves something over it is made from the source as it looks at that
+// resolution; then comes the cascade of thesis 6.4. Level k is made from level k-1: its surface is split into
+// macrosurface, which is simplified, and sub-resolution geometry, which joins all such geometry of finer levels, in the
+// form in which it left the surface; all of it is voxelised afresh at r_k.
 #include "bake/bake.h"
 
 #include <fmt/format.h>
@@ -15,8 +16,10 @@
 #include <span>
 #include <utility>
 
+#include "bake/asset_textures.h"
 #include "bake/bake_workspace.h"
 #include "bake/pack_level.h"
+#include "bake/pack_source.h"
 #include "bake/slab_hull.h"
 #include "bake/volume_job.h"
 #include "base/file_io.h"
@@ -25,7 +28,9 @@
 #include "base/result.h"
 #include "bvh/level_scene.h"
 #include "cache/level_file.h"
+#include "prefilter/face_materials.h"
 #include "prefilter/macrosurface.h"
+#include "prefilter/resolve.h"
 #include "prefilter/simplify.h"
 #include "prefilter/voxelize.h"
 
@@ -79,12 +84,16 @@ bool are_same_bake(const Manifest& a, const Manifest& b) {
   return a.source_hash == b.source_hash && a.options == b.options && a.generator == b.generator && a.source == b.source;
 }
 
-/// Whether every level's file is the one that the manifest means.
+/// Whether every level's and texture's file is the one that the manifest means.
 bool is_whole(const fs::path& asset, const Manifest& manifest) {
-  return std::ranges::all_of(manifest.levels, [&](const LevelEntry& entry) {
+  const bool has_levels = std::ranges::all_of(manifest.levels, [&](const LevelEntry& entry) {
     const auto file = LevelFile::open_known(asset / entry.file, entry.file_hash);
     return file && (*file)->file_bytes() == entry.file_bytes;
   });
+  return has_levels && std::ranges::all_of(manifest.textures, [&](const AssetTexture& texture) {
+           const auto hash = hash_file(asset / texture.file);
+           return hash && *hash == texture.file_hash;
+         });
 }
 
 /// Warnings name files as the source sees them: the same asset whatever its folder is called.
@@ -97,11 +106,11 @@ std::vector<std::string> without_folder(std::vector<std::string> warnings, const
   return warnings;
 }
 
-/// Where vertices and faces of one surface are in another.
-MorphMaps identity_maps(const Surface& surface) {
+/// Where vertices and faces of one surface are in another, as long as that is the same.
+MorphMaps identity_maps(size_t vertices, size_t faces) {
   MorphMaps maps;
-  for (uint32_t v = 0; v < surface.positions.size(); ++v) maps.vertex.push_back(v);
-  for (uint32_t f = 0; f < surface.triangles.size(); ++f) maps.face.push_back(f);
+  for (uint32_t v = 0; v < vertices; ++v) maps.vertex.push_back(v);
+  for (uint32_t f = 0; f < faces; ++f) maps.face.push_back(f);
   return maps;
 }
 
@@ -187,14 +196,14 @@ void add_to_hull(const LevelView& level, SlabHull& hull) {
 /// One bake, step by step.
 class Baker {
  public:
-  Baker(const BakeOptions& options, Surface source, BakeWorkspace workspace, BakeReport report)
-      : options_(options), workspace_(std::move(workspace)), report_(std::move(report)), surface_(std::move(source)) {}
+  Baker(const BakeOptions& options, SourceSurface source, BakeWorkspace workspace, BakeReport report)
+      : options_(options), workspace_(std::move(workspace)), report_(std::move(report)), source_(std::move(source)) {}
 
   Result<BakeReport> run() {
-    const Box3 bounds = surface_.bounds();
+    const Box3 bounds = source_.bounds();
     const double longest_side = max_component(bounds.size());
     const double finest_resolution = longest_side / options_.finest_grid;
-    report_.manifest.origin = surface_.origin;
+    report_.manifest.origin = source_.origin;
     report_.manifest.base_resolution = finest_resolution / 2;
     lattice_origin_ = 0.5 * (dvec3(bounds.lower) + dvec3(bounds.upper));
     last_level_ =
@@ -213,16 +222,24 @@ class Baker {
   }
 
  private:
-  /// Level 0: the source as it is.
+  /// Level 0: the source as it is, with the textures of its materials.
   Result<void> bake_source() {
     options_.job.report(0, "level 0: write");
     LevelReport level_report;
     level_report.grid = 2 * options_.finest_grid;
     const Stopwatch watch;
-    const SurfaceOrder order = order_surface(surface_);
-    surface_ = reorder(surface_, order);
-    from_stored_ = identity_maps(surface_);
-    auto done = store_level(pack_level(0, report_.manifest.base_resolution, surface_, order, {}, {}), level_report);
+    FARFIELD_TRY_LET(look_, write_textures(source_, workspace_.asset_dir(), options_.job));
+    texel_areas_ = texel_areas(source_, look_);
+    report_.manifest.textures = look_.textures;
+    report_.manifest.materials = look_.materials;
+
+    const Surface faces = average_faces(source_);
+    source_order_ = order_surface(faces);
+    const Surface ordered = reorder(faces, source_order_);
+    LevelData level = pack_level(0, report_.manifest.base_resolution, ordered, source_order_, {}, {});
+    level.face_sggx = {};  // hits have the normals themselves
+    pack_source(source_, source_order_, level);
+    auto done = store_level(level, level_report);
     level_report.write_seconds = watch.seconds();
     report_.levels.push_back(level_report);
     return done;
@@ -232,6 +249,14 @@ class Baker {
     LevelReport level_report;
     level_report.level = level;
     level_report.grid = options_.finest_grid >> (level - 1);
+    if (!is_resolved_) {
+      if (level != last_level_ && saves_nothing_resolved(level, resolution)) {
+        level_report.worthless = true;
+        report_.levels.push_back(level_report);
+        return {};
+      }
+      FARFIELD_TRY(resolve_source(level, resolution));
+    }
 
     const SurfaceOrder order = simplify_surface(level, resolution, level_report);
     if (options_.job.is_cancelled()) return cancelled();
@@ -247,6 +272,37 @@ class Baker {
     level_report.write_seconds = watch.seconds();
     report_.levels.push_back(level_report);
     return done;
+  }
+
+  /// Whether a level that shows the source's detail at this resolution would take more than level 0.
+  bool saves_nothing_resolved(uint32_t level, double resolution) const {
+    constexpr uint64_t kLeastPerFace = 40;  // a BVH of quads, colours and normals
+    const uint64_t faces = estimate_resolved_faces(source_, static_cast<float>(resolution));
+    const bool is_split = faces > source_.triangles.size();  // else simplification decides what it takes
+    return is_split && kLeastPerFace * faces > most_bytes_worth_writing(level);
+  }
+
+  /// Makes surface_ from the source, for this level and all that follow.
+  Result<void> resolve_source(uint32_t level, double resolution) {
+    options_.job.report(share_done(level, 0), fmt::format("level {}: resolve", level));
+    auto resolved = resolve(source_, static_cast<float>(resolution), options_.job);
+    if (!resolved) {
+      return make_error(resolved.error().code,
+                        fmt::format("{}: {}", report_.manifest.source, resolved.error().message));
+    }
+    surface_ = std::move(resolved->surface);
+    // From the final numbers of level 0; what is not there any more fades out.
+    static_assert(kNoIndex == kMorphVoxelized);
+    from_stored_ = identity_maps(source_.positions.size(), source_.triangles.size());
+    for (size_t v = 0; v < source_.positions.size(); ++v) {
+      from_stored_.vertex[source_order_.vertex_number[v]] = resolved->vertex_of[v];
+    }
+    for (size_t f = 0; f < source_.triangles.size(); ++f) {
+      from_stored_.face[source_order_.face_number[f]] = resolved->face_of[f];
+    }
+    is_resolved_ = true;
+    source_ = {};
+    return {};
   }
 
   /// Steps A and S: what is no longer surface at this resolution leaves surface_, the rest is simplified.
@@ -340,16 +396,22 @@ class Baker {
     report_.manifest.levels.push_back(entry);
 
     add_to_hull(view, hull_);
-    from_stored_ = identity_maps(surface_);
+    if (number > 0) from_stored_ = identity_maps(surface_.positions.size(), surface_.triangles.size());
     return {};
   }
 
   /// The source is always written. A coarser level must save a tenth against the last one written; for the root, which
-  /// stays resident, any saving will do.
+  /// stays resident, any saving will do. Level 0 counts with its textures as finely as that level would show them.
   uint64_t most_bytes_worth_writing(uint32_t level) const {
     if (report_.manifest.levels.empty()) return std::numeric_limits<uint64_t>::max();
-    const uint64_t before = report_.manifest.levels.back().resident_bytes;
+    const LevelEntry& last = report_.manifest.levels.back();
+    uint64_t before = last.resident_bytes;
+    if (last.level == 0) before += texture_bytes(level);
     return level == last_level_ ? before - std::min<uint64_t>(before, 1) : before - before / 10;
+  }
+
+  uint64_t texture_bytes(uint32_t level) const {
+    return texture_bytes_at(texel_areas_, look_, std::ldexp(report_.manifest.base_resolution, static_cast<int>(level)));
   }
 
   static tl::unexpected<Error> cancelled() { return make_error(ErrorCode::Cancelled, "bake: cancelled"); }
@@ -369,9 +431,14 @@ class Baker {
   const BakeOptions& options_;
   BakeWorkspace workspace_;
   BakeReport report_;
-  Surface surface_;         ///< of the level at hand, in final order
-  Surface sub_resolution_;  ///< all that has left the surface so far
-  MorphMaps from_stored_;   ///< from the last written level to surface_
+  SourceSurface source_;       ///< until it is resolved
+  SurfaceOrder source_order_;  ///< of level 0
+  AssetLook look_;
+  std::vector<double> texel_areas_;
+  bool is_resolved_ = false;  ///< from then on surface_ is there
+  Surface surface_;           ///< of the level at hand, in final order
+  Surface sub_resolution_;    ///< all that has left the surface so far
+  MorphMaps from_stored_;     ///< from the last written level to surface_
   SlabHull hull_;
   dvec3 lattice_origin_{0.0};
   uint32_t last_level_ = 0;
@@ -402,7 +469,7 @@ Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeO
   }
   FARFIELD_TRY(check_replaceable(out));  // before the import, which may take minutes
   options.job.report(0, "import");
-  FARFIELD_TRY_LET(auto asset, import_asset(source, options.import, options.job));
+  FARFIELD_TRY_LET(auto asset, import_asset(source, options.import));
   asset.warnings = without_folder(std::move(asset.warnings), source.parent_path());
   const double import_seconds = watch.seconds();
   FARFIELD_TRY_LET(auto report, bake(std::move(asset), source.filename().string(), out, options));
@@ -428,7 +495,7 @@ Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, con
     return report;
   }
   FARFIELD_TRY_LET(auto workspace, BakeWorkspace::open(out));
-  FARFIELD_TRY_LET(auto baked, Baker(options, std::move(asset.surface), std::move(workspace), std::move(report)).run());
+  FARFIELD_TRY_LET(auto baked, Baker(options, std::move(asset.source), std::move(workspace), std::move(report)).run());
   baked.total_seconds = watch.seconds();
   return baked;
 }

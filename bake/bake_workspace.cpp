@@ -61,6 +61,8 @@ bool skip_digits(std::string_view& name) {
 bool is_asset_file_name(std::string_view name) {
   if (skip(name, "level_")) {
     if (!skip_digits(name) || !skip(name, ".ffl")) return false;
+  } else if (skip(name, "texture_")) {
+    if (!skip_digits(name) || !skip(name, ".tif")) return false;
   } else if (!skip(name, kManifestName)) {
     return false;
   }

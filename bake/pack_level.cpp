@@ -201,6 +201,9 @@ float distance(const SymMat3& a, const SymMat3& b) {
                    std::abs(a.xz - b.xz), std::abs(a.yz - b.yz)});
 }
 
+/// What light sees of a face's normals.
+const SymMat3& seen_normals(const FaceMaterial& m) { return m.shading_sggx.trace() > 0 ? m.shading_sggx : m.sggx; }
+
 /// Whether all faces have the one normal that their triangle has. The tolerance is a spread of normals of half a degree
 /// (alpha = 0.01), far below what roughness in images can tell.
 bool has_flat_normals(const Surface& surface) {
@@ -210,11 +213,17 @@ bool has_flat_normals(const Surface& surface) {
     const dvec3 a(surface.positions[t.x]);
     const dvec3 normal = glm::cross(dvec3(surface.positions[t.y]) - a, dvec3(surface.positions[t.z]) - a);
     const double length = glm::length(normal);
-    const SymMat3& s = surface.materials[i].sggx;
+    const SymMat3& s = seen_normals(surface.materials[i]);
     if (!(length > 0) || !(s.trace() > 0)) continue;  // no area, nothing to see
     if (distance(SymMat3::outer(vec3(normal / length)), s * (1 / s.trace())) > kTolerance) return false;
   }
   return true;
+}
+
+/// 0 and 255 only where it is so: rays ask no further there.
+uint8_t pack_opacity(float opacity) {
+  if (!(opacity > 0)) return 0;
+  return opacity >= 1 ? uint8_t{255} : std::clamp<uint8_t>(pack_unorm8(opacity), 1, 254);
 }
 
 void pack_surface(const Surface& surface, const SurfaceOrder& order, LevelData& level) {
@@ -228,7 +237,8 @@ void pack_surface(const Surface& surface, const SurfaceOrder& order, LevelData& 
   FARFIELD_CHECK(first == surface.triangles.size());
   const auto& materials = surface.materials;
   if (!has_flat_normals(surface)) {
-    level.face_sggx = pack_each<PackedSurfaceSggx>(materials, [](const auto& m) { return pack_surface_sggx(m.sggx); });
+    level.face_sggx =
+        pack_each<PackedSurfaceSggx>(materials, [](const auto& m) { return pack_surface_sggx(seen_normals(m)); });
   }
   level.face_diffuse = pack_each<PackedColor>(materials, [](const auto& m) { return pack_color(m.diffuse); });
   level.face_specular = pack_each<PackedColor>(materials, [](const auto& m) { return pack_color(m.specular); });
@@ -236,6 +246,10 @@ void pack_surface(const Surface& surface, const SurfaceOrder& order, LevelData& 
   drop_if_all(level.face_diffuse, PackedColor{});
   drop_if_all(level.face_specular, PackedColor{});
   drop_if_all(level.face_transmission, PackedColor{});
+  level.face_opacity = pack_each<uint8_t>(materials, [](const auto& m) { return pack_opacity(m.opacity); });
+  level.face_emission = pack_each<PackedRadiance>(materials, [](const auto& m) { return pack_radiance(m.emission); });
+  drop_if_all(level.face_opacity, uint8_t{255});
+  drop_if_all(level.face_emission, PackedRadiance{});
   if (!level.face_specular.empty()) {
     level.face_roughness2 = pack_each<uint8_t>(materials, [](const auto& m) { return pack_unorm8(m.roughness2); });
   }
@@ -363,6 +377,8 @@ LevelData pack_volume(const SparseVolume& volume) {
   drop_if_all(level.voxel_specular, PackedColor{});
   drop_if_all(level.voxel_transmission, PackedColor{});
   drop_if_all(level.voxel_self_shadowing, uint8_t{255});
+  level.voxel_emission = pack_each<PackedRadiance>(voxels, [](const auto& v) { return pack_radiance(v.emission); });
+  drop_if_all(level.voxel_emission, PackedRadiance{});
   if (!level.voxel_specular.empty()) {
     level.voxel_roughness2 = pack_each<uint8_t>(voxels, [](const auto& v) { return pack_unorm8(v.roughness2); });
   }

@@ -14,7 +14,7 @@
 namespace farfield {
 
 /// Goes up when voxelize() or pack_volume() give other results.
-inline constexpr uint32_t kVoxelizeVersion = 5;
+inline constexpr uint32_t kVoxelizeVersion = 6;
 
 /// Refers to the geometry. Immutable; any thread.
 struct VolumeJob {

@@ -27,6 +27,9 @@ using EmbreeGeometryRef = RTCGeometry;
 using EmbreeContext = RTCIntersectContext;
 using EmbreeRay = RTCRay;
 using EmbreeRayHit = RTCRayHit;
+using EmbreeHit = RTCHit;
+using EmbreeFilter = RTCFilterFunctionN;
+using EmbreeFilterArguments = RTCFilterFunctionNArguments;
 
 /// geomID of a ray that hit nothing, and instID outside of instances.
 inline constexpr unsigned kNoGeometry = RTC_INVALID_GEOMETRY_ID;
@@ -103,6 +106,13 @@ void copy_array(EmbreeGeometryRef geometry, std::span<const T> array) {
   void* copy =
       rtcSetNewGeometryBuffer(geometry, EmbreeArray<T>::kType, 0, EmbreeArray<T>::kFormat, sizeof(T), array.size());
   if (copy) std::copy(array.begin(), array.end(), static_cast<T*>(copy));  // null: out of memory, which the device says
+}
+
+/// Asked about every hit, of nearest-hit and occlusion queries alike.
+inline void set_filter(EmbreeGeometryRef geometry, EmbreeFilter filter, void* user) {
+  rtcSetGeometryUserData(geometry, user);
+  rtcSetGeometryIntersectFilterFunction(geometry, filter);
+  rtcSetGeometryOccludedFilterFunction(geometry, filter);
 }
 
 inline void commit_geometry(EmbreeGeometryRef geometry) { rtcCommitGeometry(geometry); }

@@ -7,9 +7,11 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <limits>
 #include <system_error>
 
 #include "base/bytes.h"
+#include "base/hash.h"
 #include "base/result.h"
 #include "base/temporary_file.h"
 
@@ -71,6 +73,17 @@ Result<std::string> read_small_file(const fs::path& path, uint64_t max_bytes) {
     done += static_cast<size_t>(got);
   }
   return text;
+}
+
+Result<uint64_t> hash_file(const fs::path& path) {
+  FARFIELD_TRY_LET(const auto bytes, read_small_file(path, std::numeric_limits<uint64_t>::max()));
+  return hash_bytes(std::as_bytes(std::span(bytes)));
+}
+
+Result<void> sync_file(const fs::path& path) {
+  FARFIELD_TRY_LET(const auto file, open_regular_file(path));
+  if (::fsync(file.descriptor.get()) == 0) return {};
+  return make_error(ErrorCode::Io, fmt::format("cannot write {}: {}", path.string(), system_words(errno)));
 }
 
 }  // namespace farfield

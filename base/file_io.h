@@ -45,4 +45,10 @@ Result<RegularFile> open_regular_file(const std::filesystem::path& path);
 /// Reads a whole regular file of at most `max_bytes`. Errors: those of open_regular_file, BadFile (too large).
 Result<std::string> read_small_file(const std::filesystem::path& path, uint64_t max_bytes);
 
+/// XXH3 of all bytes of a regular file. Errors: those of open_regular_file.
+Result<uint64_t> hash_file(const std::filesystem::path& path);
+
+/// Waits until a regular file that somebody else has written is on the disk. Errors: those of open_regular_file, Io.
+Result<void> sync_file(const std::filesystem::path& path);
+
 }  // namespace farfield

@@ -19,10 +19,9 @@ enum class AlphaMode : uint8_t {
   Blend,  ///< alpha is the share of the light that meets it
 };
 
-/// Map: a texture and how it wraps; false when there is none. Defaults are those of a face without any material:
-/// Blender's grey, without a specular lobe.
-template <typename Map>
-struct SurfaceMaterial {
+/// What a material says without its maps. Defaults are those of a face without any material: Blender's grey, without a
+/// specular lobe.
+struct MaterialFactors {
   std::string name;                       ///< as the file has it; may be empty
   vec3 base_color{0.8f};                  ///< linear; multiplies texture and vertex colour
   float alpha = 1;                        ///< multiplies the textures' and the vertex colours' alpha
@@ -31,16 +30,21 @@ struct SurfaceMaterial {
   vec3 dielectric_f0{0.0f};               ///< reflectance at normal incidence of the part that is not metal
   float diffuse_transmission = 0;         ///< share of the diffuse light that goes through
   vec3 diffuse_transmission_color{1.0f};  ///< linear
-  Map base_color_map;                     ///< linear RGB, alpha (1 where the material ignores it)
-  Map metallic_roughness_map;             ///< g: roughness, b: metallic
-  Map alpha_map;                          ///< OBJ's map_d: its alpha channel multiplies
   AlphaMode alpha_mode = AlphaMode::Opaque;
   float alpha_cutoff = 0.5f;
-  Map normal_map;               ///< tangent space, as stored: (r, g, b) in [0, 1] is 2 (r, g, b) - 1
   float normal_scale = 1;       ///< multiplies x and y of normal_map
   vec3 emission{0.0f};          ///< linear radiance, may exceed 1
-  Map emission_map;             ///< linear RGB; multiplies emission
   float thin_transmission = 0;  ///< share of the light that goes straight through (KHR_transmission): opacity
+};
+
+/// Map: a texture and how it wraps; false when there is none.
+template <typename Map>
+struct SurfaceMaterial : MaterialFactors {
+  Map base_color_map;          ///< linear RGB, alpha (1 where the material ignores it)
+  Map metallic_roughness_map;  ///< g: roughness, b: metallic
+  Map alpha_map;               ///< OBJ's map_d: its alpha channel multiplies
+  Map normal_map;              ///< tangent space, as stored: (r, g, b) in [0, 1] is 2 (r, g, b) - 1
+  Map emission_map;            ///< linear RGB; multiplies emission
 };
 
 }  // namespace farfield

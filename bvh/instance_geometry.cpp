@@ -201,7 +201,9 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
     hit.instID[0] = embree_context->instID[0];
   } else {
     const vec3 normal(hit.Ng_x, hit.Ng_y, hit.Ng_z);
-    made.element = 2 * hit.primID + (hit.u + hit.v > 1.0f ? 1u : 0u);
+    made.element = 2 * hit.primID + quad_side(hit.u, hit.v);
+    const vec2 barycentric = face_barycentric(hit.u, hit.v);
+    made.barycentric[0] = barycentric.x, made.barycentric[1] = barycentric.y;
     made.normal_local[0] = normal.x, made.normal_local[1] = normal.y, made.normal_local[2] = normal.z;
     normal_world = instances[instance].normal_to_world(normal);
   }

@@ -13,7 +13,7 @@
 
 namespace farfield {
 
-Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level) {
+Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, EmbreeFilter filter, void* user) {
   LevelScene result;
   if (!level.has_surface()) return result;
 
@@ -25,6 +25,7 @@ Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level) 
   const EmbreeGeometry quads = new_quads(device.handle());
   share_array(quads.get(), level.positions);
   share_array(quads.get(), level.quads);
+  if (filter) set_filter(quads.get(), filter, user);
   result.scene_ = build_static_scene(device.handle(), quads.get());
   FARFIELD_TRY(check_embree(device.handle(), fmt::format("build a BVH of {} quads", level.quads.size())));
 

@@ -23,8 +23,10 @@ class LevelScene {
   /// Builds on the calling thread alone, so that the same level always takes the same bytes. The level's arrays are
   /// shared, not copied: they stay mapped until this is destroyed, but only this call reads them. Four bytes after the
   /// last position must be readable (level files see to that), because Embree loads vertices 16 bytes at a time.
-  /// Holds device.build_mutex(). Errors: Io (out of memory, or what else Embree says).
-  static Result<LevelScene> build(BvhDevice& device, const LevelView& level);
+  /// `filter`, if there is one, is asked about every hit, with `user`. Holds device.build_mutex(). Errors: Io (out of
+  /// memory, or what else Embree says).
+  static Result<LevelScene> build(BvhDevice& device, const LevelView& level, EmbreeFilter filter = nullptr,
+                                  void* user = nullptr);
 
   EmbreeSceneRef handle() const { return scene_.get(); }  ///< null without a surface
   /// Bytes that the BVH holds, overheads included.

@@ -14,7 +14,25 @@
 
 namespace farfield {
 
-/// A loaded level. Immutable; any thread.
+struct TracedLevel;
+
+/// A point on a level's surface as a ray meets it, in the level's local space.
+struct SurfacePoint {
+  uint32_t face;
+  vec2 barycentric;  ///< weights of the face's second and third corner
+  vec3 direction;    ///< of the ray, any length
+  float width;       ///< of what the ray stands for there
+};
+
+/// What faces look like up close. Any thread.
+class SurfaceLook {
+ public:
+  virtual ~SurfaceLook() = default;
+  /// The share of rays that a face stops there, of one whose face_opacity is neither 0 nor 255.
+  virtual float opacity(const TracedLevel& level, const SurfacePoint& point) const = 0;
+};
+
+/// A loaded level. Immutable; any thread. Does not move: its scene refers to it.
 struct TracedLevel {
   LevelView view;  ///< the arrays that the BVH and the volume refer to; owned elsewhere, for longer than this
   LevelScene scene;
@@ -22,14 +40,29 @@ struct TracedLevel {
   uint32_t slot = 0;        ///< its index among the asset's stored levels
   uint32_t face_count = 0;  ///< of the surface
   uint32_t voxel_count = 0;
+  const SurfaceLook* look = nullptr;  ///< null: faces are on average everywhere what they are on average
 
   /// Builds the BVH. Errors: those of LevelScene::build.
-  static Result<std::unique_ptr<TracedLevel>> build(BvhDevice& device, const LevelView& level, uint32_t slot) {
-    FARFIELD_TRY_LET(auto scene, LevelScene::build(device, level));
-    return std::make_unique<TracedLevel>(TracedLevel{level, std::move(scene), BrickVolume(level), slot,
-                                                     farfield::face_count(level), farfield::voxel_count(level)});
+  static Result<std::unique_ptr<TracedLevel>> build(BvhDevice& device, const LevelView& level, uint32_t slot,
+                                                    const SurfaceLook* look = nullptr);
+  TracedLevel(const TracedLevel&) = delete;
+  TracedLevel& operator=(const TracedLevel&) = delete;
+
+  /// The face of a quad on one side (0 or 1) of its diagonal.
+  uint32_t face_of(uint32_t quad, uint32_t side) const {
+    const ArrayView<uint32_t> first_face = view.quad_first_face;
+    const uint32_t next = quad + 1 < first_face.size() ? first_face[quad + 1] : face_count;
+    const bool is_pair = next - first_face[quad] == 2;  // not from `quads`: their pages may have been given back
+    return first_face[quad] + (is_pair ? side : 0);     // at a lone triangle's edge rounding may have said 1
   }
+
+ private:
+  TracedLevel() = default;
 };
+
+/// The side of a quad's diagonal that Embree's u and v are on, and the weights of that face's second and third corner.
+inline uint32_t quad_side(float u, float v) { return u + v > 1.0f ? 1 : 0; }
+inline vec2 face_barycentric(float u, float v) { return quad_side(u, v) ? vec2(1 - u, 1 - v) : vec2(u, v); }
 
 /// An asset, as rays see it. Stored levels ("slots") are ordered finest first. Between two plans only `loaded` changes,
 /// from null to a level.

@@ -29,6 +29,59 @@ vec3 unpack_color(PackedColor color) {
   return root * root;
 }
 
+PackedVertexColor pack_vertex_color(const vec4& linear_rgba) {
+  PackedVertexColor packed;
+  for (int i = 0; i < 4; ++i) packed.sqrt_rgba[static_cast<size_t>(i)] = to_unorm8(std::sqrt(linear_rgba[i]));
+  return packed;
+}
+
+vec4 unpack_vertex_color(PackedVertexColor color) {
+  vec4 root;
+  for (int i = 0; i < 4; ++i) root[i] = unpack_unorm8(color.sqrt_rgba[static_cast<size_t>(i)]);
+  return root * root;
+}
+
+PackedRadiance pack_radiance(const vec3& radiance) {
+  constexpr float kLeast = 1e-30f, kMost = 1e30f;
+  const float largest = std::min(max_component(radiance), kMost);
+  if (!(largest >= kLeast)) return {};
+  int exponent = 0;
+  std::frexp(largest, &exponent);  // largest < 2^exponent
+  // Rounding up to 256 takes the next exponent.
+  if (std::lround(std::ldexp(largest, 8 - exponent)) > 255) ++exponent;
+  PackedRadiance packed;
+  for (int i = 0; i < 3; ++i) {
+    const float channel = radiance[i] > 0 ? std::min(radiance[i], kMost) : 0.0f;
+    packed.rgbe[static_cast<size_t>(i)] = static_cast<uint8_t>(std::lround(std::ldexp(channel, 8 - exponent)));
+  }
+  packed.rgbe[3] = static_cast<uint8_t>(exponent + 128);
+  return packed;
+}
+
+vec3 unpack_radiance(PackedRadiance radiance) {
+  if (radiance.rgbe[3] == 0) return vec3(0.0f);
+  const float unit = std::ldexp(1.0f, int{radiance.rgbe[3]} - 128 - 8);
+  return unit * vec3(radiance.rgbe[0], radiance.rgbe[1], radiance.rgbe[2]);
+}
+
+PackedNormal pack_normal(const vec3& unit_normal) {
+  const vec3 n = unit_normal / (std::abs(unit_normal.x) + std::abs(unit_normal.y) + std::abs(unit_normal.z));
+  const auto sign = [](float x) { return x < 0 ? -1.0f : 1.0f; };
+  const vec2 p = n.z >= 0 ? vec2(n) : vec2((1 - std::abs(n.y)) * sign(n.x), (1 - std::abs(n.x)) * sign(n.y));
+  const auto pack = [](float x) { return static_cast<int16_t>(std::lround(std::clamp(x, -1.0f, 1.0f) * 32767.0f)); };
+  return {{pack(p.x), pack(p.y)}};
+}
+
+vec3 unpack_normal(PackedNormal normal) {
+  const auto at = [&](size_t i) { return std::max(static_cast<float>(normal.octahedral[i]) / 32767.0f, -1.0f); };
+  vec3 n(at(0), at(1), 0);
+  n.z = 1 - std::abs(n.x) - std::abs(n.y);
+  const float below = std::max(-n.z, 0.0f);
+  n.x += n.x < 0 ? below : -below;
+  n.y += n.y < 0 ? below : -below;
+  return glm::normalize(n);
+}
+
 LevelView view_of(const LevelData& level) {
   LevelView view;
   view.header = level.header;

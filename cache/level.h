@@ -32,6 +32,31 @@ struct PackedColor {
 PackedColor pack_color(const vec3& linear_rgb);
 vec3 unpack_color(PackedColor color);
 
+/// Linear RGB in [0, 1] as PackedColor has it, and alpha as round(255 sqrt(a)).
+struct PackedVertexColor {
+  std::array<uint8_t, 4> sqrt_rgba;
+  friend bool operator==(const PackedVertexColor&, const PackedVertexColor&) = default;
+};
+PackedVertexColor pack_vertex_color(const vec4& linear_rgba);
+vec4 unpack_vertex_color(PackedVertexColor color);
+
+/// Radiance from 1e-30 to 1e30, linear RGB: three mantissas and an exponent that they share, 0.4 % of the largest
+/// channel [Ward 1991].
+struct PackedRadiance {
+  std::array<uint8_t, 4> rgbe;
+  friend bool operator==(const PackedRadiance&, const PackedRadiance&) = default;
+};
+PackedRadiance pack_radiance(const vec3& radiance);
+vec3 unpack_radiance(PackedRadiance radiance);
+
+/// A unit vector on the octahedron, 7e-5 rad [Cigolle et al. 2014].
+struct PackedNormal {
+  std::array<int16_t, 2> octahedral;
+  friend bool operator==(const PackedNormal&, const PackedNormal&) = default;
+};
+PackedNormal pack_normal(const vec3& unit_normal);
+vec3 unpack_normal(PackedNormal normal);
+
 /// A scalar in [0, 1] as round(255 x).
 uint8_t pack_unorm8(float x);
 inline float unpack_unorm8(uint8_t x) { return static_cast<float>(x) * (1.0f / 255.0f); }
@@ -65,6 +90,10 @@ static_assert(sizeof(Brick) == 640);
 inline constexpr uint32_t kMorphVoxelized = 0xffffffffu;  ///< it became part of the volume of level k: fades out
 inline constexpr uint32_t kMorphCollapsed = 0xfffffffeu;  ///< (faces) its area shrinks to 0 while vertices move
 
+/// source_face holds the number of a face of the source, shifted by this, and which of the triangle's corners the face
+/// starts with: corner k of the face is corner (turn + k) % 3 of the source's triangle.
+inline constexpr int kSourceTurnBits = 2;
+
 /// What every level has besides arrays. Lengths are in the asset's local units, positions relative to its origin.
 struct LevelHeader {
   uint32_t level = 0;        ///< k
@@ -83,9 +112,10 @@ inline ivec3 brick_coordinates(const LevelHeader& header, uint64_t table_index) 
 }
 
 /// Every array of a level, once, in the order in which they lie in the file: ARRAY(id in files, Name, field, element,
-/// group). Ids never change their meaning. The first two arrays are only read by BVH builds, the last two only by
-/// morphs: ends of the file that can be given back. Arrays of one group have the same length; those of faces and voxels
-/// may be absent, and then mean the default written beside them.
+/// group). Ids never change their meaning. The first two arrays are read by BVH builds, and where faces have texture
+/// coordinates at hits; morph maps only by morphs: parts of the file that can be given back. Arrays of one group have
+/// the same length; those of faces, voxels and shading vertices may be absent, and then mean the default written beside
+/// them.
 // clang-format off
 #define FARFIELD_LEVEL_ARRAYS(ARRAY)                                                                                 \
   /* surface */                                                                                                      \
@@ -108,7 +138,18 @@ inline ivec3 brick_coordinates(const LevelHeader& header, uint64_t table_index) 
   ARRAY(16, VoxelSelfShadowing, voxel_self_shadowing, uint8_t,           Voxels)        /* unorm8 of A in (0, 1]; 1 */ \
   /* from the next finer stored level: where its vertices and faces are in this one, or kMorph... */                \
   ARRAY(17, MorphVertex,        morph_vertex,         uint32_t,          MorphVertices)                              \
-  ARRAY(18, MorphFace,          morph_face,           uint32_t,          MorphFaces)
+  ARRAY(18, MorphFace,          morph_face,           uint32_t,          MorphFaces)                                 \
+  /* what stops and emits light */                                                                                   \
+  ARRAY(19, FaceOpacity,        face_opacity,         uint8_t,           Faces)         /* unorm8; 1 */              \
+  ARRAY(20, FaceEmission,       face_emission,        PackedRadiance,    Faces)         /* both sides; 0 */          \
+  ARRAY(21, VoxelEmission,      voxel_emission,       PackedRadiance,    Voxels)        /* of its flakes; 0 */       \
+  /* level 0, for close-ups and hosts' materials */                                                                  \
+  ARRAY(22, FaceMaterialId,     face_material,        uint16_t,          Faces)         /* of the manifest's; 0 */   \
+  ARRAY(23, SourceFace,         source_face,          uint32_t,          Faces)         /* number, turn; unknown */   \
+  ARRAY(24, CornerVertex,       corner_vertex,        uvec3,             Faces)         /* shading vertices */       \
+  ARRAY(25, ShadingNormal,      shading_normal,       PackedNormal,      ShadingVertices) /* the face's own */       \
+  ARRAY(26, ShadingUv,          shading_uv,           vec2,              ShadingVertices) /* v down; none */         \
+  ARRAY(27, ShadingColor,       shading_color,        PackedVertexColor, ShadingVertices) /* white */
 // clang-format on
 
 /// The arrays, owned (Array = std::vector<T>) while baking, or as spans into a mapped file at run time.

@@ -87,12 +87,27 @@ Problem check_face_numbers(const LevelView& level) {
   return {};
 }
 
+/// Shading vertices, and that faces refer to them.
+Problem check_shading_vertices(const LevelView& level) {
+  const uint64_t count = std::max({level.shading_normal.size(), level.shading_uv.size(), level.shading_color.size()});
+  if (level.corner_vertex.empty() != (count == 0)) return "corner_vertex and shading vertices do not go together";
+  if (count > kMaxElements) return "it has too many shading vertices";
+  const auto bad = [&](const uvec3& corners) { return std::max({corners.x, corners.y, corners.z}) >= count; };
+  const auto found = std::ranges::find_if(level.corner_vertex, bad);
+  if (found != level.corner_vertex.end()) {
+    return fmt::format("corner_vertex[{}] = ({}, {}, {}), and there are {} shading vertices",
+                       found - level.corner_vertex.begin(), found->x, found->y, found->z, count);
+  }
+  return check_lengths(level, SectionGroup::ShadingVertices, "shading vertices", count);
+}
+
 Problem check_surface(const LevelView& level) {
   if (Problem problem = check_quads(level)) return problem;
   if (Problem problem = check_face_numbers(level)) return problem;
   if (level.face_specular.size() != level.face_roughness2.size()) {
     return "face_specular and face_roughness2 do not go together";
   }
+  if (Problem problem = check_shading_vertices(level)) return problem;
   return check_lengths(level, SectionGroup::Faces, "faces", face_count(level));
 }
 

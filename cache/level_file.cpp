@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <sys/mman.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <vector>
@@ -37,19 +38,29 @@ struct FileRange {
   uint64_t end = 0;
 };
 
-bool is_build_only(const SectionEntry& section) {
-  const auto id = static_cast<SectionId>(section.id);
-  return id == SectionId::Positions || id == SectionId::Quads || id == SectionId::MorphVertex ||
-         id == SectionId::MorphFace;
-}
+/// Which sections rays read: with texture coordinates they need the triangles too.
+struct RaysRead {
+  bool triangles;
 
-/// The whole pages that hold only sections which rays do not read: positions and quads at the file's beginning, morph
-/// maps at its end.
+  explicit RaysRead(const LevelLayout& layout)
+      : triangles(std::ranges::any_of(layout.sections, [](const SectionEntry& section) {
+          return static_cast<SectionId>(section.id) == SectionId::ShadingUv;
+        })) {}
+
+  bool operator()(const SectionEntry& section) const {
+    const auto id = static_cast<SectionId>(section.id);
+    if (id == SectionId::Positions || id == SectionId::Quads) return triangles;
+    return id != SectionId::MorphVertex && id != SectionId::MorphFace;
+  }
+};
+
+/// The whole pages that hold only sections which rays do not read.
 std::vector<FileRange> build_only_pages(const LevelLayout& layout) {
+  const RaysRead rays_read(layout);
   std::vector<FileRange> ranges;
   for (size_t i = 0; i < layout.sections.size(); ++i) {
-    if (!is_build_only(layout.sections[i])) continue;
-    const bool continues = i > 0 && is_build_only(layout.sections[i - 1]);
+    if (rays_read(layout.sections[i])) continue;
+    const bool continues = i > 0 && !rays_read(layout.sections[i - 1]);
     if (!continues) ranges.push_back({round_up(layout.sections[i].offset, kPageBytes), 0});
     const bool is_last = i + 1 == layout.sections.size();
     ranges.back().end =

@@ -48,8 +48,8 @@ class LevelFile {
   uint64_t file_bytes() const { return map_bytes_; }
   /// The whole file, for hashing.
   std::span<const std::byte> bytes() const { return {map_, map_bytes_}; }
-  /// Bytes of the whole pages that hold only positions and quads, which only a BVH build reads, and morph maps, which
-  /// rays that dissolve between levels do not read.
+  /// Bytes of the whole pages that hold only morph maps, which rays that dissolve between levels do not read, and
+  /// positions and quads, unless faces have texture coordinates: then hits read them, else only a BVH build does.
   uint64_t build_only_bytes() const;
   /// Gives those pages back to the system; they return from disk if touched again. Any thread.
   void release_build_pages() const;

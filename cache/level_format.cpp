@@ -225,9 +225,11 @@ std::vector<std::byte> encode_head(const LevelView& level, const LevelLayout& la
     if (!array.empty()) table[next++].hash = hash_values(array);
   });
 
+  constexpr uint32_t kLastOfVersion1 = 18;
+  const bool is_of_version_1 = table.empty() || table.back().id <= kLastOfVersion1;
   FileHeader header{};
   header.magic = kLevelFileMagic;
-  header.version = kLevelFileVersion;
+  header.version = is_of_version_1 ? 1 : kLevelFileVersion;  // so that older readers read what they can
   header.section_count = static_cast<uint32_t>(table.size());
   header.file_bytes = layout.file_bytes;
   header.level = level.header.level;

@@ -24,7 +24,7 @@ enum class LevelCheck;  // cache/level_file.h
 
 static_assert(std::endian::native == std::endian::little, "level files are little-endian and are used in place");
 
-inline constexpr uint32_t kLevelFileVersion = 1;
+inline constexpr uint32_t kLevelFileVersion = 2;  ///< 1 had arrays 1 to 18 alone
 /// Not text (first byte), and a copy in text mode breaks it (line ends), as in PNG.
 inline constexpr std::array<uint8_t, 8> kLevelFileMagic = {0x89, 'F', 'F', 'L', 'V', '\r', '\n', 0x1a};
 inline constexpr uint64_t kSectionAlignment = 64;  ///< a cache line; Brick needs it
@@ -45,7 +45,17 @@ enum class SectionId : uint32_t {
 std::string_view section_name(SectionId id);
 
 /// Which arrays have the same length.
-enum class SectionGroup { Vertices, Quads, Faces, BrickTable, Bricks, Voxels, MorphVertices, MorphFaces };
+enum class SectionGroup {
+  Vertices,
+  Quads,
+  Faces,
+  BrickTable,
+  Bricks,
+  Voxels,
+  MorphVertices,
+  MorphFaces,
+  ShadingVertices
+};
 
 /// Calls visit(id, group, array) for every array of a level, in file order. Level: LevelData or LevelView, const or
 /// not.
@@ -88,9 +98,9 @@ struct SectionEntry {
 };
 static_assert(sizeof(SectionEntry) == 40);
 
-static_assert(sizeof(vec3) == 12 && sizeof(PackedColor) == 3 && offsetof(Brick, prefix) == 64 &&
-              offsetof(Brick, density_scale) == 80 && offsetof(Brick, payload_base) == 84 &&
-              offsetof(Brick, density) == 128);
+static_assert(sizeof(vec3) == 12 && sizeof(uvec3) == 12 && sizeof(vec2) == 8 && sizeof(PackedColor) == 3 &&
+              offsetof(Brick, prefix) == 64 && offsetof(Brick, density_scale) == 80 &&
+              offsetof(Brick, payload_base) == 84 && offsetof(Brick, density) == 128);
 
 /// Where each array of a level lies in its file. Hashes are 0.
 struct LevelLayout {

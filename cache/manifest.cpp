@@ -4,22 +4,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "base/file_io.h"
 #include "base/hash.h"
+#include "cache/json_reader.h"
+#include "cache/material_json.h"
 
 namespace farfield {
 
 namespace fs = std::filesystem;
-// Keys are written in the order of the documentation, but read into a sorted map: an ordered one is searched from the
-// start for each key, and a hostile manifest has hundreds of thousands.
-using Json = nlohmann::json;
-using OrderedJson = nlohmann::ordered_json;
-
 namespace {
 
 constexpr uint64_t kMaxManifestBytes = uint64_t{4} << 20;
@@ -29,7 +24,7 @@ constexpr uint64_t kMaxBytes = uint64_t{1} << 50;
 constexpr uint64_t kMaxElements = uint64_t{1} << 32;
 constexpr size_t kMaxSourceFiles = 1 << 13;
 constexpr size_t kMaxWarnings = 64;
-constexpr int kMaxDepth = 16;  // of nesting; ours is 4
+constexpr int kMaxDepth = 16;  // of nesting; ours is 5
 
 // ---- what must hold, for reading and for writing ----
 
@@ -48,8 +43,6 @@ std::string printable(std::string_view text) {
       line, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
   return text.size() > kLongest ? line + "..." : line;
 }
-
-using Problem = std::optional<std::string>;
 
 Problem find_level_problem(const LevelEntry& level) {
   if (level.level >= kMaxLevels) return fmt::format("level numbers end at {}", kMaxLevels - 1);
@@ -86,12 +79,19 @@ Problem find_problem(const Manifest& manifest) {
   if (manifest.source_files && manifest.source_files->size() > kMaxSourceFiles) {
     return fmt::format("there are more than {} source files", kMaxSourceFiles);
   }
+  if (Problem problem = find_material_problem(manifest)) return problem;
   if (manifest.warnings.size() > kMaxWarnings) return fmt::format("there are more than {} warnings", kMaxWarnings);
   if (manifest.levels.empty()) return "there are no levels";
   if (manifest.levels.size() > kMaxLevels) {
     return fmt::format("there are {} levels, and at most {} are possible", manifest.levels.size(), kMaxLevels);
   }
   std::set<std::string> files;
+  for (const AssetTexture& texture : manifest.textures) {
+    if (!is_plain_file_name(texture.file)) {
+      return fmt::format("\"{}\" is not a file name inside the folder", printable(texture.file));
+    }
+    if (!files.insert(texture.file).second) return fmt::format("\"{}\" serves two textures", texture.file);
+  }
   for (size_t i = 0; i < manifest.levels.size(); ++i) {
     const LevelEntry& level = manifest.levels[i];
     if (Problem problem = find_level_problem(level)) return fmt::format("levels[{}]: {}", i, *problem);
@@ -123,86 +123,6 @@ int nesting_depth(std::string_view text) {
   }
   return deepest;
 }
-
-/// Reads fields and remembers the first thing that is wrong, so that the reading code states no errors itself.
-class FieldReader {
- public:
-  Problem problem;
-
-  const Json* field(const Json& object, const char* key, const std::string& where) {
-    if (problem) return nullptr;
-    if (!object.is_object()) return fail(where, "an object");
-    const auto found = object.find(key);
-    if (found == object.end()) {
-      problem = fmt::format("\"{}\" is missing{}{}", key, where.empty() ? "" : " in ", where);
-      return nullptr;
-    }
-    return &*found;
-  }
-  std::string text(const Json& object, const char* key, const std::string& where = "") {
-    const Json* value = field(object, key, where);
-    if (value == nullptr) return {};
-    return text(*value, join(where, key));
-  }
-  std::string text(const Json& value, const std::string& where) {
-    if (!value.is_string()) return fail(where, "a text"), std::string();
-    return value.get<std::string>();
-  }
-  uint64_t count(const Json& object, const char* key, const std::string& where = "") {
-    const Json* value = field(object, key, where);
-    if (value == nullptr) return 0;
-    if (!value->is_number_unsigned()) return fail(join(where, key), "an integer from 0 to 2^64 - 1"), 0;
-    return value->get<uint64_t>();
-  }
-  uint32_t count32(const Json& object, const char* key, const std::string& where) {
-    const uint64_t value = count(object, key, where);
-    if (value > 0xffffffffu) fail(join(where, key), "an integer below 2^32");
-    return static_cast<uint32_t>(value);
-  }
-  /// Hashes are text: many JSON tools round integers above 2^53.
-  uint64_t hash(const Json& object, const char* key, const std::string& where = "") {
-    const std::string digits = text(object, key, where);
-    uint64_t value = 0;
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);
-    if (digits.size() != 16 || error != std::errc() || end != digits.data() + digits.size()) {
-      fail(join(where, key), "a hash of 16 hexadecimal digits");
-    }
-    return value;
-  }
-  double number(const Json& value, const std::string& where) {
-    if (!value.is_number()) return fail(where, "a number"), 0.0;
-    return value.get<double>();
-  }
-  double number(const Json& object, const char* key, const std::string& where) {
-    const Json* value = field(object, key, where);
-    return value == nullptr ? 0.0 : number(*value, join(where, key));
-  }
-  dvec3 point(const Json& value, const std::string& where) {
-    if (problem) return {};
-    if (!value.is_array() || value.size() != 3) return fail(where, "three numbers"), dvec3();
-    return {number(value[0], where), number(value[1], where), number(value[2], where)};
-  }
-  dvec3 point(const Json& object, const char* key, const std::string& where = "") {
-    const Json* value = field(object, key, where);
-    return value == nullptr ? dvec3() : point(*value, join(where, key));
-  }
-  const Json& array(const Json& object, const char* key) {
-    static const Json kEmpty = Json::array();
-    const Json* value = field(object, key, "");
-    if (value == nullptr) return kEmpty;
-    if (!value->is_array()) return fail(key, "a list"), kEmpty;
-    return *value;
-  }
-
- private:
-  static std::string join(const std::string& where, const char* key) {
-    return where.empty() ? std::string(key) : where + "." + key;
-  }
-  const Json* fail(const std::string& where, const char* expected) {
-    if (!problem) problem = fmt::format("{} must be {}", where, expected);
-    return nullptr;
-  }
-};
 
 LevelErrors errors_from_json(const Json& json, const std::string& where, FieldReader& read) {
   LevelErrors errors;
@@ -265,6 +185,8 @@ Manifest manifest_from_json(const Json& json, FieldReader& read) {
     if (read.problem || manifest.hull.size() > kMaxHullPoints) break;
     manifest.hull.push_back(vec3(read.point(point, fmt::format("hull[{}]", manifest.hull.size()))));
   }
+  if (json.is_object() && json.contains("textures")) manifest.textures = textures_from_json(json, read);
+  if (json.is_object() && json.contains("materials")) manifest.materials = materials_from_json(json, read);
   if (json.is_object() && json.contains("warnings")) manifest.warnings = warnings_from_json(json, read);
   const Json& levels = read.array(json, "levels");
   if (levels.size() > kMaxLevels) {
@@ -313,7 +235,8 @@ std::string manifest_to_json(const Manifest& manifest) {
   for (const vec3& point : manifest.hull) hull.push_back(to_json(dvec3(point)));
   OrderedJson levels = OrderedJson::array();
   for (const LevelEntry& level : manifest.levels) levels.push_back(to_json(level));
-  OrderedJson json = {{"version", manifest.version},
+  const bool is_of_version_1 = manifest.materials.empty() && manifest.textures.empty();
+  OrderedJson json = {{"version", is_of_version_1 ? 1 : kFormatVersion},
                       {"generator", manifest.generator},
                       {"source", manifest.source},
                       {"source_hash", to_hex(manifest.source_hash)},
@@ -325,6 +248,8 @@ std::string manifest_to_json(const Manifest& manifest) {
                       {"levels", std::move(levels)},
                       {"hull", std::move(hull)}};
   if (manifest.source_files) json["source_files"] = to_json(*manifest.source_files);
+  if (!manifest.textures.empty()) json["textures"] = to_json(manifest.textures);
+  if (!manifest.materials.empty()) json["materials"] = to_json(manifest.materials);
   if (!manifest.warnings.empty()) json["warnings"] = manifest.warnings;
   // `replace`: a source's file name need not be UTF-8, JSON must be.
   return json.dump(2, ' ', false, OrderedJson::error_handler_t::replace) + "\n";

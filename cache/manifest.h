@@ -12,10 +12,11 @@
 #include "base/hash.h"
 #include "base/result.h"
 #include "base/vec.h"
+#include "cache/asset_material.h"
 
 namespace farfield {
 
-inline constexpr int kFormatVersion = 1;
+inline constexpr int kFormatVersion = 2;  ///< 1 had neither materials nor textures
 inline constexpr const char* kManifestName = "manifest.json";
 
 /// Errors of a level as docs/error_metric.md defines them, signed fractions; absent until `farfield evaluate` has run.
@@ -56,6 +57,8 @@ struct Manifest {
   Box3 bounds;                 ///< of all levels, relative to origin
   double base_resolution = 0;  ///< r_0
   std::vector<vec3> hull;      ///< points whose convex hull contains all levels (tight instance bounds)
+  std::vector<AssetTexture> textures;
+  std::vector<AssetMaterial> materials;  ///< LevelArrays::face_material indexes it
   std::vector<LevelEntry> levels;
 };
 

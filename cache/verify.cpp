@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 
+#include "base/file_io.h"
 #include "base/hash.h"
 #include "cache/level_file.h"
 #include "cache/manifest.h"
@@ -41,6 +42,7 @@ class Verifier {
     for (const LevelEntry& entry : manifest->levels) {
       finer = check_level(entry, finer, entry.level == manifest->levels.front().level);
     }
+    for (const AssetTexture& texture : manifest->textures) check_texture(texture);
     check_folder();
     return result_;
   }
@@ -85,6 +87,14 @@ class Verifier {
     check_hull(level);
     check_morph(level, finer, is_first);
     return FinerLevel{level.positions.size(), face_count(level)};
+  }
+
+  void check_texture(const AssetTexture& texture) {
+    file_ = texture.file;
+    const auto hash = hash_file(folder_ / texture.file);
+    if (!hash) return error(hash.error().message);
+    result_.bytes_checked += texture.file_bytes;
+    if (texture.file_hash != *hash) mismatch("the file's hash", to_hex(texture.file_hash), to_hex(*hash));
   }
 
   /// r_k = 2^k r_0, the same in manifest and file. Files store floats.
@@ -186,6 +196,7 @@ class Verifier {
   void check_folder() {
     std::set<std::string> known = {kManifestName};
     for (const LevelEntry& entry : manifest_->levels) known.insert(entry.file);
+    for (const AssetTexture& texture : manifest_->textures) known.insert(texture.file);
     std::set<std::string> strangers;  // sorted: the order of a folder is not
     std::error_code failure;
     for (fs::directory_iterator entry(folder_, failure), end; !failure && entry != end; entry.increment(failure)) {

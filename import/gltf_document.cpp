@@ -30,6 +30,7 @@ constexpr std::string_view kKnownExtensions[] = {"EXT_mesh_gpu_instancing",
                                                  "KHR_materials_ior",
                                                  "KHR_materials_pbrSpecularGlossiness",
                                                  "KHR_materials_specular",
+                                                 "KHR_materials_transmission",
                                                  "KHR_materials_unlit",
                                                  "KHR_mesh_quantization",
                                                  "KHR_texture_transform"};
@@ -117,8 +118,8 @@ std::string used_compression(const Model& model) {
 }
 
 /// Extensions of materials that the mesh reader warns about, each with the material's name.
-constexpr std::string_view kNamedByMaterials[] = {"KHR_materials_transmission", "KHR_materials_clearcoat",
-                                                  "KHR_materials_sheen", "KHR_materials_anisotropy"};
+constexpr std::string_view kNamedByMaterials[] = {"KHR_materials_clearcoat", "KHR_materials_sheen",
+                                                  "KHR_materials_anisotropy", "KHR_materials_volume"};
 
 /// A line for each extension that is used, not required, and not read.
 std::vector<std::string> warn_of_unknown_extensions(const Model& model) {

@@ -94,6 +94,7 @@ class MaterialReader {
     const auto& source = document_.model.materials[static_cast<size_t>(index)];
     const auto& pbr = source.pbrMetallicRoughness;
     SourceMaterial out;
+    out.name = source.name;
     out.base_color = vec3(1.0f);
     if (pbr.baseColorFactor.size() == 4) {
       for (int c = 0; c < 3; ++c) out.base_color[c] = unit(pbr.baseColorFactor[static_cast<size_t>(c)]);
@@ -110,10 +111,8 @@ class MaterialReader {
       set_diffuse_texture(*glossiness, out, uv_[target]);
     else
       set_textures(source, out, uv_[target]);
-    const auto& e = source.emissiveFactor;
-    if (std::any_of(e.begin(), e.end(), [](double v) { return v > 0; })) {
-      warn(fmt::format("material {}: emission is ignored", source.name));
-    }
+    set_normals(source, out, uv_[target]);
+    set_emission(source, out, uv_[target]);
     mesh_.materials[target] = std::move(out);
   }
 
@@ -122,8 +121,7 @@ class MaterialReader {
       out.alpha_mode = AlphaMode::Mask;
       out.alpha_cutoff = std::isfinite(source.alphaCutoff) ? static_cast<float>(source.alphaCutoff) : 0.5f;
     } else if (source.alphaMode == "BLEND") {
-      out.alpha_mode = AlphaMode::Mask;
-      warn(fmt::format("material {}: alpha blending is cut at 0.5, there is no partial transparency", source.name));
+      out.alpha_mode = AlphaMode::Blend;
     }
   }
 
@@ -188,8 +186,14 @@ class MaterialReader {
   }
 
   void set_transmission(const tinygltf::Material& source, SourceMaterial& out) {
+    if (const Value* e = extension(source.extensions, "KHR_materials_transmission")) {
+      out.thin_transmission = unit(extension_number(*e, "transmissionFactor").value_or(0.0));
+      if (e->Has("transmissionTexture")) {
+        warn(fmt::format("material {}: the texture of its transmission is ignored", source.name));
+      }
+    }
     for (const char* ignored :
-         {"KHR_materials_transmission", "KHR_materials_clearcoat", "KHR_materials_sheen", "KHR_materials_anisotropy"}) {
+         {"KHR_materials_clearcoat", "KHR_materials_sheen", "KHR_materials_anisotropy", "KHR_materials_volume"}) {
       if (extension(source.extensions, ignored)) warn(fmt::format("material {}: {} is ignored", source.name, ignored));
     }
     const Value* e = extension(source.extensions, "KHR_materials_diffuse_transmission");
@@ -212,19 +216,52 @@ class MaterialReader {
           texture(color.index, out.alpha_mode != AlphaMode::Opaque ? TextureUse::ColorWithAlpha : TextureUse::Color);
     }
     if (rough.index < 0) return;
-    const UvSource rough_uv = uv_source(rough.texCoord, rough.extensions);
     out.metallic_roughness_map = texture(rough.index, TextureUse::Data);
-    if (!out.metallic_roughness_map) return;
-    if (!out.base_color_map) {
-      uv = rough_uv;
-    } else if (!(uv == rough_uv)) {
-      // One set of coordinates per corner is kept: this texture goes in by its mean.
-      const vec4 mean = out.metallic_roughness_map.image->mean();
-      out.roughness *= mean.y;
-      out.metallic *= mean.z;
-      out.metallic_roughness_map = {};
-      warn(fmt::format("material {}: roughness has texture coordinates of its own; its mean is used", source.name));
+    if (!out.metallic_roughness_map || shares_uv(out, uv, uv_source(rough.texCoord, rough.extensions))) return;
+    const vec4 mean = out.metallic_roughness_map.image->mean();
+    out.roughness *= mean.y;
+    out.metallic *= mean.z;
+    out.metallic_roughness_map = {};
+    warn(fmt::format("material {}: roughness has texture coordinates of its own; its mean is used", source.name));
+  }
+
+  void set_normals(const tinygltf::Material& source, SourceMaterial& out, UvSource& uv) {
+    const auto& map = source.normalTexture;
+    if (map.index < 0) return;
+    out.normal_map = texture(map.index, TextureUse::Data);
+    out.normal_scale = std::isfinite(map.scale) ? static_cast<float>(std::clamp(map.scale, -100.0, 100.0)) : 1.0f;
+    if (!out.normal_map || shares_uv(out, uv, uv_source(map.texCoord, map.extensions))) return;
+    out.normal_map = {};
+    warn(fmt::format("material {}: its normal map has texture coordinates of its own; it is ignored", source.name));
+  }
+
+  void set_emission(const tinygltf::Material& source, SourceMaterial& out, UvSource& uv) {
+    constexpr double kBrightest = 1e9;
+    double strength = 1;
+    if (const Value* e = extension(source.extensions, "KHR_materials_emissive_strength")) {
+      strength = std::clamp(extension_number(*e, "emissiveStrength").value_or(1.0), 0.0, kBrightest);
     }
+    for (size_t c = 0; c < std::min<size_t>(source.emissiveFactor.size(), 3); ++c) {
+      out.emission[static_cast<int>(c)] = unit(source.emissiveFactor[c]) * static_cast<float>(strength);
+    }
+    const auto& map = source.emissiveTexture;
+    if (map.index < 0 || out.emission == vec3(0.0f)) return;
+    out.emission_map = texture(map.index, TextureUse::Color);
+    if (!out.emission_map || shares_uv(out, uv, uv_source(map.texCoord, map.extensions))) return;
+    out.emission *= vec3(out.emission_map.image->mean());
+    out.emission_map = {};
+    warn(fmt::format("material {}: emission has texture coordinates of its own; its mean is used", source.name));
+  }
+
+  /// Whether a map that was just read can go by the coordinates of those before it: one set per corner is kept.
+  static bool shares_uv(const SourceMaterial& material, UvSource& uv, const UvSource& wanted) {
+    int maps = 0;
+    for (const SourceTexture* map :
+         {&material.base_color_map, &material.metallic_roughness_map, &material.normal_map, &material.emission_map}) {
+      maps += bool(*map);
+    }
+    if (maps == 1) uv = wanted;
+    return uv == wanted;
   }
 
   /// Null, with a warning, when the image cannot be had: the factors then stand alone.
@@ -301,6 +338,7 @@ class GltfMeshReader {
     FARFIELD_TRY(materials_.ready());
     if (!mesh_.corner_uv.empty()) mesh_.corner_uv.resize(mesh_.corner_count(), no_uv());
     if (!mesh_.corner_color.empty()) mesh_.corner_color.resize(mesh_.corner_count(), vec4(1.0f));
+    if (!mesh_.corner_normal.empty()) mesh_.corner_normal.resize(mesh_.corner_count(), vec3(0.0f));
     return std::move(mesh_);
   }
 
@@ -418,14 +456,36 @@ class GltfMeshReader {
       mesh_.face_begin.push_back(static_cast<uint32_t>(mesh_.corner_count()));
       mesh_.face_material.push_back(material);
     }
+    FARFIELD_TRY(add_normals(primitive, triangles, to_world, vertex_count, first_corner, place));
     FARFIELD_TRY(add_uvs(primitive, triangles, material, vertex_count, first_corner, place));
     return add_colors(primitive, triangles, vertex_count, first_corner, place);
+  }
+
+  Result<void> add_normals(const tinygltf::Primitive& primitive, const std::vector<uvec3>& triangles,
+                           const glm::dmat4& to_world, size_t vertex_count, size_t first_corner,
+                           const std::string& place) {
+    const auto attribute = primitive.attributes.find("NORMAL");
+    if (attribute == primitive.attributes.end()) return {};
+    FARFIELD_TRY_LET(const auto values, read_accessor(document_, attribute->second, 3));
+    if (values.size() / 3 < vertex_count) return document_.bad(place + ": fewer normals than vertices");
+    // Normals go with the inverse transpose; its length does not matter, and surfaces have two sides.
+    const glm::dmat3 normal_to_world = glm::transpose(glm::inverse(glm::dmat3(to_world)));
+    mesh_.corner_normal.resize(first_corner, vec3(0.0f));
+    for (const uvec3& t : triangles) {
+      for (int k = 0; k < 3; ++k) {
+        const double* n = &values[3 * size_t{t[k]}];
+        const dvec3 normal = normal_to_world * dvec3(n[0], n[1], n[2]);
+        const double length = glm::length(normal);
+        mesh_.corner_normal.push_back(length > 0 ? vec3(normal / length) : vec3(0.0f));
+      }
+    }
+    return {};
   }
 
   Result<void> add_uvs(const tinygltf::Primitive& primitive, const std::vector<uvec3>& triangles, uint32_t material,
                        size_t vertex_count, size_t first_corner, const std::string& place) {
     const SourceMaterial& m = mesh_.materials[material];
-    if (!m.base_color_map && !m.metallic_roughness_map) return {};
+    if (!m.base_color_map && !m.metallic_roughness_map && !m.normal_map && !m.emission_map) return {};
     const UvSource& source = materials_.uv(material);
     const auto attribute = primitive.attributes.find(fmt::format("TEXCOORD_{}", source.set));
     if (attribute == primitive.attributes.end()) {

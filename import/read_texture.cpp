@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
+#include "base/texture_module.h"
 #include "import/texture.h"
-#include "import/texture_module.h"
 
 namespace farfield {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The module farfield_textures: decoding through OpenImageIO, which no other file sees.
+// The module farfield_textures: decoding through OpenImageIO, which only the files of this module see.
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
@@ -7,8 +7,9 @@
 #include <algorithm>
 #include <memory>
 
+#include "base/texture_module.h"
 #include "farfield/export.h"
-#include "import/texture_module.h"
+#include "import/texture_oiio.h"
 
 namespace farfield {
 namespace {
@@ -77,5 +78,6 @@ Result<DecodedImage> read_file(const std::string& name) {
 }  // namespace
 }  // namespace farfield
 
-extern "C" FARFIELD_API const farfield::TextureModule farfield_texture_module_1;
-const farfield::TextureModule farfield_texture_module_1 = {farfield::read_file, farfield::decode};
+extern "C" FARFIELD_API const farfield::TextureModule farfield_texture_module_2;
+const farfield::TextureModule farfield_texture_module_2 = {farfield::read_file, farfield::decode,
+                                                           farfield::write_mip_map, farfield::make_texture_lookup};

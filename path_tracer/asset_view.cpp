@@ -59,7 +59,7 @@ Result<ViewImages> AssetView::render(const ViewOptions& options, const Lights& l
                                              options.width_world, options.width, options.height);
   TraceOptions trace = options.trace;
   trace.transparent = true;
-  Film film(options.width, options.height, true);
+  Film film(options.width, options.height, {.half_buffers = true});
   const TraceScene scene{impl_->scene.get(), impl_->runtime.get(), &lights};
   FARFIELD_TRY(path_trace(scene, camera, trace, film, job));
   return ViewImages{select_channels(film.image(), {"R", "G", "B", "A"}), {film.half(0), film.half(1)}};

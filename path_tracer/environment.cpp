@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every environment is a table of cells that directions are drawn from, plus, for the sky, a disc that is drawn apart:
-// it is far smaller than a cell and carries about half of the light. The density is the mixture of the two.
+// Every environment is a table of cells that directions are drawn from, plus discs that are drawn apart: suns are far
+// smaller than a cell and carry about half of the light. The density is the mixture of all.
 #include "path_tracer/environment.h"
 
 #include <fmt/format.h>
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "base/texture_module.h"
 #include "path_tracer/lat_long.h"
 #include "path_tracer/preetham_sky.h"
 
@@ -25,7 +26,9 @@ struct SunDisc {
   float chord2 = 0;       ///< squared distance on the unit sphere from the centre to the edge
   float solid_angle = 0;  ///< steradian
   vec3 radiance{0.0f};
+  float probability = 0;  ///< share of the samples that it gets
 
+  double power() const { return static_cast<double>(luminance(radiance) * solid_angle); }
   bool contains(const vec3& wi) const {
     const vec3 offset = wi - direction;
     return glm::dot(offset, offset) < chord2;
@@ -39,25 +42,36 @@ struct SunDisc {
   }
 };
 
-SunDisc make_disc(const vec3& direction, float angle_rad, const vec3& irradiance) {
+SunDisc make_disc(const DistantLight& light) {
+  const float angle_rad = std::clamp(light.angle_rad, 1e-3f, 1.0f);
   SunDisc disc;
-  disc.direction = direction;
+  disc.direction = light.direction;
   const float half_chord = std::sin(0.25f * angle_rad);  // the edge is angle / 2 from the centre
   disc.chord2 = 4 * half_chord * half_chord;
   disc.solid_angle = kPi * disc.chord2;
   // A surface that faces a cone of half angle a receives pi sin^2(a) times its radiance.
   const float sin_edge = std::sin(0.5f * angle_rad);
-  disc.radiance = irradiance / (kPi * sin_edge * sin_edge);
+  disc.radiance = light.irradiance / (kPi * sin_edge * sin_edge);
   return disc;
 }
 
-// The sky above, and below the horizon the ground that it lights.
+// How much haze lies below the eye: between it and an endless ground that is seen at angle a below the horizon there is
+// 1 / sin(a) of it. 2 degrees down half of the light is the ground's.
+constexpr float kHazeBelowEye = 0.025f;
+
+// The sky above, and below the horizon the ground that it lights, which fades into the haze of the sky behind it.
 struct Sky {
   PreethamSky model;
   float scale;  ///< of the model's kcd / m^2
   vec3 ground{0.0f};
 
-  vec3 radiance(const vec3& wi) const { return wi.y < 0 ? ground : scale * model.radiance(wi); }
+  vec3 radiance(const vec3& wi) const {
+    if (wi.y >= 0) return scale * model.radiance(wi);
+    const vec3 horizon(wi.x, 0.0f, wi.z);
+    const float distance = glm::length(horizon);
+    if (!(distance > 0)) return ground;  // straight down
+    return glm::mix(scale * model.radiance(horizon / distance), ground, std::exp(kHazeBelowEye / wi.y));
+  }
   // On a horizontal surface.
   vec3 irradiance() const {
     dvec3 sum(0.0);
@@ -103,17 +117,27 @@ struct Environment::Impl {
   LatLongDistribution cells;
   std::vector<vec3> texels;  ///< one per cell; empty for a sky
   std::optional<Sky> sky;
-  std::optional<SunDisc> disc;
-  float disc_probability = 0;  ///< share of the samples that the disc gets
+  std::vector<SunDisc> discs;
+  float cell_probability = 1;  ///< share of the samples that the cells get; with the discs' 1
 
   vec3 background(const vec3& wi) const { return sky ? sky->radiance(wi) : texels[grid.cell(wi)]; }
   float cell_pdf(const vec3& wi) const { return cells.integral() > 0 ? cells.pdf(wi) : 0.0f; }
+  void share_samples();
 };
+
+// In proportion to what each sends.
+void Environment::Impl::share_samples() {
+  double total = cells.integral();
+  for (const SunDisc& disc : discs) total += disc.power();
+  if (!(total > 0)) return;
+  for (SunDisc& disc : discs) disc.probability = static_cast<float>(disc.power() / total);
+  cell_probability = static_cast<float>(cells.integral() / total);
+}
 
 Environment Environment::constant(const vec3& radiance) {
   const LatLongGrid grid{1, 1};
   const float weight[] = {luminance(radiance)};
-  return Environment(std::make_shared<Impl>(Impl{grid, LatLongDistribution(grid, weight), {radiance}, {}, {}, 0.0f}));
+  return Environment(std::make_shared<Impl>(Impl{grid, LatLongDistribution(grid, weight), {radiance}, {}, {}, 1.0f}));
 }
 
 Environment Environment::sun_sky(const SunSkyOptions& options) {
@@ -133,24 +157,25 @@ Environment Environment::sun_sky(const SunSkyOptions& options) {
   const float model_sun = luminance(model.sun_irradiance());
   Sky sky{model, options.sun_irradiance / std::max(model_sun, kDimmestSunKlx)};
 
-  std::optional<SunDisc> disc;
+  DistantLight sun{towards_sun, vec3(0.0f), options.sun_angle_rad};
   vec3 ground_irradiance = sky.irradiance();
   if (sun_is_up && options.sun_irradiance > 0) {
-    vec3 color = options.sun_color.value_or(model.sun_irradiance());
-    color /= std::max(luminance(color), 1e-20f);
-    const vec3 irradiance = options.sun_irradiance * color;
-    disc = make_disc(towards_sun, std::clamp(options.sun_angle_rad, 1e-3f, 1.0f), irradiance);
-    ground_irradiance += irradiance * towards_sun.y;
+    const vec3 color = options.sun_color.value_or(model.sun_irradiance());
+    sun.irradiance = color * (options.sun_irradiance / std::max(luminance(color), 1e-20f));
+    ground_irradiance += sun.irradiance * towards_sun.y;
   }
   sky.ground = options.ground_albedo * kInvPi * ground_irradiance;
 
   LatLongDistribution cells(kSkyGrid, cell_luminances(sky));
-  float disc_probability = 0;
-  if (disc) {
-    const double disc_power = static_cast<double>(luminance(disc->radiance) * disc->solid_angle);
-    disc_probability = static_cast<float>(disc_power / (disc_power + cells.integral()));
-  }
-  return Environment(std::make_shared<Impl>(Impl{kSkyGrid, std::move(cells), {}, sky, disc, disc_probability}));
+  return Environment(std::make_shared<Impl>(Impl{kSkyGrid, std::move(cells), {}, sky, {}, 1.0f})).with({&sun, 1});
+}
+
+Environment Environment::with(std::span<const DistantLight> lights) const {
+  auto impl = std::make_shared<Impl>(*impl_);
+  for (const DistantLight& light : lights)
+    if (max_component(light.irradiance) > 0) impl->discs.push_back(make_disc(light));
+  impl->share_samples();
+  return Environment(std::move(impl));
 }
 
 Result<Environment> Environment::from_image(const Image& image, float scale) {
@@ -172,38 +197,61 @@ Result<Environment> Environment::from_image(const Image& image, float scale) {
     }
   }
   LatLongDistribution cells(grid, weights);
-  return Environment(std::make_shared<Impl>(Impl{grid, std::move(cells), std::move(texels), {}, {}, 0.0f}));
+  return Environment(std::make_shared<Impl>(Impl{grid, std::move(cells), std::move(texels), {}, {}, 1.0f}));
 }
 
-Result<Environment> Environment::from_exr(const std::filesystem::path& path, float scale) {
-  FARFIELD_TRY_LET(const auto file, read_exr(path));
-  auto environment = from_image(file.image, scale);
+namespace {
+
+// Radiance's .hdr, which OpenImageIO reads.
+Result<Image> read_hdr(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored))
+    return make_error(ErrorCode::NotFound, fmt::format("{}: no such file", path.string()));
+  FARFIELD_TRY_LET(const auto module, texture_module());
+  FARFIELD_TRY_LET(auto decoded, module->read_file(path.string()));
+  if (!decoded.is_float || decoded.channels != 3)
+    return make_error(ErrorCode::BadFile, fmt::format("{}: not a picture of light (Radiance HDR)", path.string()));
+  Image image(decoded.width, decoded.height, {"R", "G", "B"});
+  image.values = std::move(decoded.values);
+  return image;
+}
+
+Result<Image> read_light(const std::filesystem::path& path) {
+  if (path.extension() == ".hdr" || path.extension() == ".HDR") return read_hdr(path);
+  FARFIELD_TRY_LET(auto file, read_exr(path));
+  return std::move(file.image);
+}
+
+}  // namespace
+
+Result<Environment> Environment::from_file(const std::filesystem::path& path, float scale) {
+  FARFIELD_TRY_LET(const auto image, read_light(path));
+  auto environment = from_image(image, scale);
   if (!environment)
     return make_error(environment.error().code, fmt::format("{}: {}", path.string(), environment.error().message));
   return environment;
 }
 
 vec3 Environment::radiance(const vec3& wi) const {
-  const bool in_disc = impl_->disc && impl_->disc->contains(wi);
-  return impl_->background(wi) + (in_disc ? impl_->disc->radiance : vec3(0.0f));
+  vec3 sum = impl_->background(wi);
+  for (const SunDisc& disc : impl_->discs)
+    if (disc.contains(wi)) sum += disc.radiance;
+  return sum;
 }
 
 EnvironmentSample Environment::sample(float choice, Rng& rng) const {
-  EnvironmentSample sample;
-  if (choice < impl_->disc_probability) {
-    sample.wi = impl_->disc->sample(rng);
-  } else {
-    if (!(impl_->cells.integral() > 0)) return sample;
-    sample.wi = impl_->cells.sample(rng);
+  const auto from = [&](const vec3& wi) { return EnvironmentSample{wi, radiance(wi), pdf(wi)}; };
+  for (const SunDisc& disc : impl_->discs) {
+    if (choice < disc.probability) return from(disc.sample(rng));
+    choice -= disc.probability;
   }
-  sample.radiance = radiance(sample.wi);
-  sample.pdf = pdf(sample.wi);
-  return sample;
+  return impl_->cells.integral() > 0 ? from(impl_->cells.sample(rng)) : EnvironmentSample();
 }
 
 float Environment::pdf(const vec3& wi) const {
-  float density = (1 - impl_->disc_probability) * impl_->cell_pdf(wi);
-  if (impl_->disc && impl_->disc->contains(wi)) density += impl_->disc_probability / impl_->disc->solid_angle;
+  float density = impl_->cell_probability * impl_->cell_pdf(wi);
+  for (const SunDisc& disc : impl_->discs)
+    if (disc.contains(wi)) density += disc.probability / disc.solid_angle;
   return density;
 }
 

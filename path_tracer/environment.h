@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light from everywhere: a constant, an analytic sun and sky, or a latitude-longitude image.
+// Light from everywhere: a constant, an analytic sun and sky, or a latitude-longitude image; and distant lights in it.
 //
 // World up is +y. Units are radiometric W / (m^2 sr), linear RGB with Rec. 709 primaries; glTF's photometric lights
 // come in divided by 683 lm / W.
@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "base/random.h"
 #include "base/result.h"
@@ -26,8 +27,15 @@ struct EnvironmentSample {
   float pdf = 0;        ///< per steradian
 };
 
-/// A clear sky [Preetham et al. 1999] with a sun disc; below the horizon a grey ground, lit by both. How bright the sky
-/// is against the sun follows the model.
+/// A disc infinitely far away, of constant radiance.
+struct DistantLight {
+  vec3 direction{0.0f, 1.0f, 0.0f};  ///< towards it, unit
+  vec3 irradiance{0.0f};             ///< linear RGB on a surface that faces it, W / m^2, >= 0
+  float angle_rad = 0.0093f;         ///< diameter; clamped to [1e-3, 1]
+};
+
+/// A clear sky [Preetham et al. 1999] with a sun disc; below the horizon a grey ground, lit by both, that fades into
+/// the haze of the horizon. How bright the sky is against the sun follows the model.
 struct SunSkyOptions {
   vec3 sun_direction{0.0f, 1.0f, 0.0f};  ///< towards the sun, need not be unit
   float sun_irradiance = 4.5f;           ///< luminance of the sun's light on a surface that faces it, W / m^2, >= 0
@@ -51,8 +59,12 @@ class Environment {
   /// x grows from -z towards +x (a glTF camera looks at the image's centre). Texels are constant patches. Negative and
   /// NaN texels count as 0. scale multiplies the radiance. Errors: InvalidArgument (no texels, less than 3 channels).
   static Result<Environment> from_image(const Image& image, float scale = 1.0f);
-  /// Reads an EXR file and makes an environment of it. Errors: those of read_exr and from_image.
-  static Result<Environment> from_exr(const std::filesystem::path& path, float scale = 1.0f);
+  /// Reads an EXR file, or Radiance's .hdr where the name says so, and makes an environment of it. Errors: those of
+  /// read_exr, of texture_module() and its reader, and of from_image.
+  static Result<Environment> from_file(const std::filesystem::path& path, float scale = 1.0f);
+
+  /// This and more light. Lights without irradiance are left out.
+  Environment with(std::span<const DistantLight> lights) const;
 
   /// Radiance that arrives from unit direction `wi`.
   vec3 radiance(const vec3& wi) const;

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
 
 #include "base/embree.h"
 #include "base/file_io.h"
@@ -13,6 +14,7 @@
 #include "base/parallel.h"
 #include "base/process_memory.h"
 #include "base/result.h"
+#include "cache/manifest.h"
 #include "path_tracer/asset_library.h"
 #include "path_tracer/film.h"
 #include "path_tracer/render_session.h"
@@ -46,11 +48,12 @@ std::string make_fingerprint(const RenderOptions& options, std::span<const fs::p
   const TraceOptions& trace = options.trace;
   std::string text = fmt::format(
       "size {}x{} spp {} seed {} depth {} roulette {} clamp {} strategy {} transparent {} budget {} scale {} blend {} "
-      "full {} exposure {} camera {} fps {} scene {} environment {} assets",
+      "full {} exposure {} cryptomatte {} camera {} fps {} scene {} environment {} sky {} assets",
       options.width, options.height, trace.samples_per_pixel, trace.seed, trace.max_depth, trace.roulette_depth,
       trace.clamp_indirect, static_cast<int>(trace.strategy), trace.transparent, options.budget_bytes,
-      options.lod_scale, static_cast<int>(options.blend), options.full_detail, options.exposure_stops, options.camera,
-      options.frames_per_second, identity(options.scene), identity(options.environment));
+      options.lod_scale, static_cast<int>(options.blend), options.full_detail, options.exposure_stops,
+      options.cryptomatte, options.camera, options.frames_per_second, identity(options.scene),
+      identity(options.environment), options.sky);
   for (const fs::path& folder : asset_folders)
     if (!folder.empty()) text += fmt::format(" {}:{}", folder.filename().string(), to_hex(manifest_hash(folder)));
   return text;
@@ -74,6 +77,17 @@ Metadata frame_metadata(const RenderOptions& options, const Camera& camera, int 
   };
 }
 
+// With ids: whose they are.
+Metadata frame_metadata(const RenderOptions& options, const Camera& camera, int frame,
+                        std::span<const GltfInstance> instances) {
+  Metadata metadata = frame_metadata(options, camera, frame);
+  if (!options.cryptomatte) return metadata;
+  std::set<std::string> names;
+  for (const GltfInstance& instance : instances) names.insert(object_name(instance));
+  metadata.merge(cryptomatte_metadata(id_layer_name(IdLayer::Object), names));
+  return metadata;
+}
+
 bool same_places(std::span<const GltfInstance> a, std::span<const GltfInstance> b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const GltfInstance& x, const GltfInstance& y) {
     return x.mesh == y.mesh && x.to_world == y.to_world;
@@ -84,6 +98,13 @@ void report_problems(const RenderOptions& options, const FrameReport& frame) {
   if (options.warning && frame.invalid_samples > 0)
     options.warning(
         fmt::format("frame {}: {} paths were not finite and are black", frame.frame, frame.invalid_samples));
+}
+
+bool any_has_textures(const std::vector<std::filesystem::path>& folders) {
+  return std::ranges::any_of(folders, [](const std::filesystem::path& folder) {
+    const auto manifest = read_manifest(folder);  // what is wrong with it the session says
+    return manifest && !manifest->textures.empty();
+  });
 }
 
 }  // namespace
@@ -116,10 +137,10 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOption
 
 Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const FrameSink& sink) {
   // Everything of ours first, assets last: see warm_up.h.
-  Film film(options_.width, options_.height);
+  Film film(options_.width, options_.height, {.ids = options_.cryptomatte});
   // As many threads as parallel_for uses: a default device would lift a limit on them.
   FARFIELD_TRY_LET(auto device, make_embree_device(thread_count()));
-  FARFIELD_TRY(warm_up(device.get(), film.image()));
+  FARFIELD_TRY(warm_up(device.get(), film.image(), any_has_textures(asset_folders_)));
 
   RenderReport report;
   report.assets = asset_names_;
@@ -151,8 +172,8 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     report.frames.push_back(std::move(frame));
     report.peak_accounted_bytes = std::max(report.peak_accounted_bytes, session->stats().peak_accounted_bytes);
     report.peak_rss_bytes = memory.peak_bytes();
-    if (auto taken = sink(film.image(), frame_metadata(options_, camera, frames[i]), report); !taken)
-      return tl::unexpected(taken.error());
+    const Metadata metadata = frame_metadata(options_, camera, frames[i], session_instances);
+    if (auto taken = sink(film.image(), metadata, report); !taken) return tl::unexpected(taken.error());
   }
   report.peak_rss_bytes = memory.peak_bytes();
   return report;

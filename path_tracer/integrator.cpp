@@ -37,8 +37,9 @@ struct PathRay {
 
 class PathTracer {
  public:
-  PathTracer(const TraceScene& scene, const TraceOptions& options)
-      : scene_(scene), lights_(*scene.lights), options_(options) {}
+  /// view_axis: the camera's, along which depth is measured.
+  PathTracer(const TraceScene& scene, const TraceOptions& options, const vec3& view_axis)
+      : scene_(scene), lights_(*scene.lights), options_(options), view_axis_(view_axis) {}
 
   /// light_choice: uniform in [0, 1), for the first event's EnvironmentSample.
   FilmSample trace(const CameraRay& camera_ray, uint64_t path_key, float light_choice);
@@ -55,10 +56,12 @@ class PathTracer {
   void add_point_lights(const Interaction& vertex, const PathRay& incoming);
   void add(const vec3& radiance);
   bool survives_roulette();
+  void describe(const Interaction& seen, const CameraRay& camera_ray, FilmSample& sample) const;
 
   const TraceScene& scene_;
   const Lights& lights_;
   const TraceOptions& options_;
+  const vec3 view_axis_;
 
   // Of the path in hand.
   Rng rng_{0};
@@ -172,6 +175,19 @@ bool PathTracer::survives_roulette() {
   return true;
 }
 
+// What the camera ray met, for all channels but the colour.
+void PathTracer::describe(const Interaction& seen, const CameraRay& camera_ray, FilmSample& sample) const {
+  sample.alpha = 1;
+  sample.lod_level = static_cast<float>(seen.level);
+  sample.lod_blend = seen.lambda - std::floor(seen.lambda);
+  sample.footprint = seen.footprint;
+  sample.lod_volume = seen.kind == Interaction::Kind::Volume ? 1.0f : 0.0f;
+  sample.albedo = seen.albedo;
+  sample.normal = seen.shading_normal;
+  sample.depth = glm::dot(seen.position - camera_ray.origin, view_axis_);
+  if (seen.instance < scene_.object_ids.size()) sample.ids[size_t(IdLayer::Object)] = scene_.object_ids[seen.instance];
+}
+
 FilmSample PathTracer::trace(const CameraRay& camera_ray, uint64_t path_key, float light_choice) {
   rng_ = Rng(path_key);
   path_seed_ = rng_.next_uint();
@@ -190,13 +206,8 @@ FilmSample PathTracer::trace(const CameraRay& camera_ray, uint64_t path_key, flo
     }
     const Interaction vertex = scene_.runtime->interaction(ray_hit_, context_);
     last_hit_ = context_.hit;
-    if (depth_ == 0) {
-      result.alpha = 1;
-      result.lod_level = static_cast<float>(vertex.level);
-      result.lod_blend = vertex.lambda - std::floor(vertex.lambda);
-      result.footprint = vertex.footprint;
-      result.lod_volume = vertex.kind == Interaction::Kind::Volume ? 1.0f : 0.0f;
-    }
+    if (depth_ == 0) describe(vertex, camera_ray, result);
+    if (max_component(vertex.emission) > 0) add(vertex.emission);
     if (++depth_ > options_.max_depth) break;
     add_sampled_environment(vertex, ray);
     add_point_lights(vertex, ray);
@@ -242,7 +253,7 @@ void trace_tile(PathTracer& tracer, const Camera& camera, const TraceOptions& op
     for (int x = tile_x * kTileSide; x < x_end; ++x) {
       const uint64_t pixel_key = mix64(options.seed, static_cast<uint64_t>(y) * film.width() + x);
       const PixelLattice lattice(pixel_key);
-      PixelSums sums;
+      PixelSums sums(film.has_ids());
       for (int s = 0; s < options.samples_per_pixel; ++s) {
         const CameraRay ray =
             camera.ray(static_cast<float>(x) + lattice.value(s, 0), static_cast<float>(y) + lattice.value(s, 1));
@@ -286,7 +297,7 @@ Result<TraceStats> path_trace(const TraceScene& scene, const Camera& camera, con
 
   parallel_for(tile_count, 1, [&](size_t begin, size_t end) {
     for (size_t tile = begin; tile < end && !job.is_cancelled(); ++tile) {
-      PathTracer tracer(scene, options);
+      PathTracer tracer(scene, options, camera.forward());
       trace_tile(tracer, camera, options, static_cast<int>(tile) % columns, static_cast<int>(tile) / columns, film);
       rays += tracer.stats.rays;
       invalid_samples += tracer.stats.invalid_samples;

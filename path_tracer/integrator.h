@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/embree.h"
@@ -37,6 +38,7 @@ struct TraceScene {
   EmbreeSceneRef embree = nullptr;
   const Runtime* runtime = nullptr;
   const Lights* lights = nullptr;
+  std::span<const uint32_t> object_ids{};  ///< for Film::has_ids(): cryptomatte_id per InstanceId
 };
 
 /// How direct light of the environment is found. All three converge to the same image.

@@ -30,8 +30,10 @@ struct RenderOptions {
   float lod_scale = 1.0f;
   Blend blend = Blend::Dissolve;
   bool full_detail = false;           ///< level 0 only, from assets baked with --source-only
-  std::filesystem::path environment;  ///< EXR; empty: sun and sky, the sun from the scene's directional light
+  std::filesystem::path environment;  ///< EXR or Radiance HDR; empty: sun and sky, see make_lights()
+  bool sky = true;                    ///< false: without an environment there is no light but the scene's own
   float exposure_stops = 0;           ///< of the PNG previews
+  bool cryptomatte = false;           ///< also write ids of objects, see film.h
   uint32_t finest_grid = 512;         ///< of assets that have to be baked first
   /// Command that bakes: called as BAKER bake SCENE -o DIR --mesh N ... Empty: this very program.
   std::filesystem::path baker;
@@ -64,7 +66,7 @@ struct RenderReport {
   std::vector<FrameReport> frames;    ///< those that are finished, in order
 };
 
-/// Renders one frame to `out` (EXR with all AOVs and metadata) and to the PNG beside it.
+/// Renders one frame to `out` (EXR with the channels of film.h and metadata) and to the PNG beside it.
 /// frame: n is the scene at n / RenderOptions::frames_per_second, or GltfScene::frames_per_second where that is 0.
 /// Errors: those of the scene, the bake, the runtime, the files; Cancelled.
 Result<RenderReport> render_frame(const RenderOptions& options, int frame, const std::filesystem::path& out);

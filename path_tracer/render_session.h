@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "base/embree.h"
@@ -14,6 +15,9 @@
 #include "path_tracer/render_job.h"
 
 namespace farfield {
+
+/// What an object is called in the picture's ids: as its node, else by the node's number.
+std::string object_name(const GltfInstance& instance);
 
 /// One thread at a time; render() itself uses all threads.
 class RenderSession {
@@ -34,6 +38,7 @@ class RenderSession {
  private:
   RenderSession() = default;
   std::unique_ptr<Runtime> runtime_;
+  std::vector<uint32_t> object_ids_;  ///< cryptomatte_id per InstanceId
   EmbreeScene scene_;
 };
 

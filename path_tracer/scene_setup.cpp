@@ -37,6 +37,35 @@ PointLight make_point_light(const GltfLight& light) {
 
 float strength(const GltfLight& light) { return light.intensity * luminance(light.color); }
 
+DistantLight make_distant_light(const GltfLight& light) {
+  DistantLight distant;
+  distant.direction = -light.direction;
+  distant.irradiance = light.color * (light.intensity / kLumensPerWatt);
+  return distant;
+}
+
+// The sky of the brightest directional light, which is its sun; the others shine beside it.
+Environment make_sky(std::vector<GltfLight> directional) {
+  SunSkyOptions sky = default_sun_sky();
+  std::stable_sort(directional.begin(), directional.end(),
+                   [](const GltfLight& a, const GltfLight& b) { return strength(a) > strength(b); });
+  std::vector<DistantLight> others;
+  for (const GltfLight& light : directional) others.push_back(make_distant_light(light));
+  if (!directional.empty() && strength(directional[0]) > 0) {
+    sky.sun_direction = -directional[0].direction;
+    sky.sun_irradiance = strength(directional[0]) / kLumensPerWatt;
+    sky.sun_color = directional[0].color;
+    others.erase(others.begin());
+  }
+  return Environment::sun_sky(sky).with(others);
+}
+
+Environment make_darkness(const std::vector<GltfLight>& directional) {
+  std::vector<DistantLight> lights;
+  for (const GltfLight& light : directional) lights.push_back(make_distant_light(light));
+  return Environment::constant(vec3(0.0f)).with(lights);
+}
+
 }  // namespace
 
 Result<size_t> find_camera(const GltfScene& scene, const std::string& name) {
@@ -67,33 +96,25 @@ Camera make_camera(const GltfScene& scene, size_t index, double seconds, int wid
 
 Result<Lights> make_lights(const GltfScene& scene, const RenderOptions& options, std::vector<std::string>& warnings) {
   Lights lights;
-  const GltfLight* sun = nullptr;
-  size_t directional_count = 0;
+  std::vector<GltfLight> directional;
   for (const GltfLight& light : scene.lights) {
-    if (light.type != GltfLight::Type::Directional) {
+    if (light.type == GltfLight::Type::Directional)
+      directional.push_back(light);
+    else
       lights.points.push_back(make_point_light(light));
-      continue;
-    }
-    ++directional_count;
-    if (!sun || strength(light) > strength(*sun)) sun = &light;
   }
 
   if (!options.environment.empty()) {
-    FARFIELD_TRY_LET(auto environment, Environment::from_exr(options.environment));
+    FARFIELD_TRY_LET(auto environment, Environment::from_file(options.environment));
     lights.environment = environment;
-    if (sun) warnings.push_back("the environment image replaces the scene's directional lights");
-    return lights;
+    if (!directional.empty()) warnings.push_back("the environment image replaces the scene's directional lights");
+  } else if (options.sky) {
+    lights.environment = make_sky(directional);
+  } else {
+    lights.environment = make_darkness(directional);
+    if (scene.lights.empty())
+      warnings.push_back("neither sky nor lights: only what glows by itself is seen; leave out --no-sky for daylight");
   }
-  SunSkyOptions sky = default_sun_sky();
-  if (sun && strength(*sun) > 0) {
-    sky.sun_direction = -sun->direction;
-    sky.sun_irradiance = strength(*sun) / kLumensPerWatt;
-    sky.sun_color = sun->color;
-  }
-  if (directional_count > 1)
-    warnings.push_back(
-        fmt::format("{} directional lights: the brightest is the sun, the others are left out", directional_count));
-  lights.environment = Environment::sun_sky(sky);
   return lights;
 }
 

@@ -24,10 +24,10 @@ Result<size_t> find_camera(const GltfScene& scene, const std::string& name);
 /// whatever the file's aspect ratio. A scene without a camera is seen whole, from above and in front.
 Camera make_camera(const GltfScene& scene, size_t index, double seconds, int width, int height);
 
-/// Environment: options.environment, or sun and sky. The sun is the brightest directional light, in its direction,
-/// colour and strength; without one default_sun_sky(). Point and spot lights come as they are. What cannot be rendered
-/// (further directional lights, or all of them beside an environment image) adds a line to `warnings`. Errors: those of
-/// Environment::from_exr.
+/// Environment: options.environment, or sun and sky, or darkness where options.sky is off. The sky's sun is the
+/// brightest directional light, in its direction, colour and strength; without one default_sun_sky(). All other lights
+/// come as they are. What cannot be rendered (directional lights beside an environment image) and what leaves nothing
+/// to be seen adds a line to `warnings`. Errors: those of Environment::from_file.
 Result<Lights> make_lights(const GltfScene& scene, const RenderOptions& options, std::vector<std::string>& warnings);
 
 }  // namespace farfield

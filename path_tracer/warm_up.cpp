@@ -8,6 +8,7 @@
 
 #include "base/result.h"
 #include "base/temporary_file.h"
+#include "base/texture_module.h"
 #include "cache/level_file.h"
 #include "cache/manifest.h"
 #include "path_tracer/integrator.h"
@@ -68,13 +69,37 @@ void add_haze(LevelData& level) {
   level.voxel_self_shadowing.assign(payloads, pack_unorm8(0.8f));
 }
 
-Result<LevelEntry> write_warm_up_level(const fs::path& folder, uint32_t number) {
+// A texture over all of the sheet, and the material that has it.
+Result<void> add_texture(const fs::path& folder, Manifest& manifest) {
+  AssetTexture texture;
+  texture.file = "texture_0.tif";
+  texture.width = texture.height = 64;
+  texture.channels = 3;
+  texture.cache_bytes = 64 * 64 * 6;
+  FARFIELD_TRY_LET(const TextureModule* module, texture_module());
+  const MipLevel level{64, 64, std::vector<uint16_t>(64 * 64 * 3, 0x8000)};
+  FARFIELD_TRY(module->write_mip_map((folder / texture.file).string(), {&level, 1}, 3, false));
+  manifest.textures.push_back(texture);
+  manifest.materials.emplace_back().base_color_map.texture = 0;
+  return {};
+}
+
+void add_coordinates(LevelData& level) {
+  for (const Quad& quad : level.quads) {
+    level.corner_vertex.push_back({quad.v0, quad.v1, quad.v3});
+    level.corner_vertex.push_back({quad.v2, quad.v3, quad.v1});
+  }
+  for (const vec3& position : level.positions) level.shading_uv.emplace_back(position.x, position.z);
+}
+
+Result<LevelEntry> write_warm_up_level(const fs::path& folder, uint32_t number, bool with_textures) {
   LevelData level;
   const float resolution = kSize / (kBricks * kBrickSide) * std::exp2(static_cast<float>(number) - 1.0f);
   level.header.level = number;
   level.header.resolution = resolution;
   level.header.bounds = {vec3(0.0f), vec3(kSize)};
   add_sheet(level);
+  if (number == 0 && with_textures) add_coordinates(level);
   if (number == 1) add_haze(level);
 
   LevelEntry entry;
@@ -93,7 +118,7 @@ Result<LevelEntry> write_warm_up_level(const fs::path& folder, uint32_t number) 
   return entry;
 }
 
-Result<void> write_warm_up_asset(const fs::path& folder) {
+Result<void> write_warm_up_asset(const fs::path& folder, bool with_textures) {
   Manifest manifest;
   manifest.generator = "warm-up";
   manifest.source = "none";
@@ -102,9 +127,10 @@ Result<void> write_warm_up_asset(const fs::path& folder) {
   for (int corner = 0; corner < 8; ++corner)
     manifest.hull.push_back(kSize * vec3(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1));
   for (uint32_t number = 0; number < 2; ++number) {
-    FARFIELD_TRY_LET(auto entry, write_warm_up_level(folder, number));
+    FARFIELD_TRY_LET(auto entry, write_warm_up_level(folder, number, with_textures));
     manifest.levels.push_back(entry);
   }
+  if (with_textures) FARFIELD_TRY(add_texture(folder, manifest));
   return write_manifest(folder, manifest);
 }
 
@@ -142,9 +168,9 @@ Result<void> write_images(const fs::path& folder, const Image& frame) {
 
 }  // namespace
 
-Result<void> warm_up(EmbreeDeviceRef device, const Image& frame) {
+Result<void> warm_up(EmbreeDeviceRef device, const Image& frame, bool with_textures) {
   FARFIELD_TRY_LET(auto folder, TemporaryFolder::create());
-  FARFIELD_TRY(write_warm_up_asset(folder.path()));
+  FARFIELD_TRY(write_warm_up_asset(folder.path(), with_textures));
   FARFIELD_TRY(trace_warm_up_asset(device, folder.path()));
   FARFIELD_TRY(write_images(folder.path(), frame));
   // Once more after the trim: what the writers need stays with the process, as it does between frames.

@@ -14,7 +14,8 @@ namespace farfield {
 
 /// Renders a tiny asset of its own through a throw-away Runtime on all threads, writes `frame` (the film that later
 /// frames use) as EXR and PNG to the temporary folder, and gives free memory back to the system but for what the
-/// writers use. Nothing stays on disk. Errors: Io (no temporary folder), those of Runtime.
-Result<void> warm_up(EmbreeDeviceRef device, const Image& frame);
+/// writers use. `with_textures`: looks textures up, too. Nothing stays on disk. Errors: Io (no temporary folder), those
+/// of Runtime.
+Result<void> warm_up(EmbreeDeviceRef device, const Image& frame, bool with_textures);
 
 }  // namespace farfield

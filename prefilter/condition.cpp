@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// From polygons to a Surface: move near the origin, weld, triangulate, look at textures, cut masks.
+// From polygons to clean triangles: move near the origin, weld, triangulate.
 #include "prefilter/condition.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
-#include <unordered_map>
+#include <cmath>
 #include <unordered_set>
 
 #include "base/hash.h"
 #include "base/index.h"
-#include "base/parallel.h"
 #include "base/result.h"
-#include "prefilter/alpha_cut.h"
 #include "prefilter/triangulate.h"
 #include "prefilter/weld.h"
 
@@ -32,36 +29,45 @@ constexpr double kFarInSides = 64;
 
 // ---- positions
 
-/// Keeps the faces for which keep(face) holds; the other arrays of the mesh stay in step.
+/// Calls visit(array) for each array that has an element per corner, also where it is empty.
+template <typename Visit>
+void for_each_corner_array(SourceMesh& mesh, const Visit& visit) {
+  visit(mesh.corner_position);
+  visit(mesh.corner_uv);
+  visit(mesh.corner_color);
+  visit(mesh.corner_normal);
+}
+
+/// Keeps the faces for which keep(begin, end) of their corners holds; `number` gets the former numbers of those.
 template <typename Keep>
-size_t remove_faces(SourceMesh& mesh, const Keep& keep) {
-  size_t corners = 0, faces = 0, dropped = 0;
-  uint32_t begin = 0;
-  for (size_t face = 0; face < mesh.face_count(); ++face) {
+size_t remove_faces(SourceMesh& mesh, std::vector<uint32_t>& number, const Keep& keep) {
+  uint32_t corners = 0, begin = 0;
+  for (uint32_t face = 0; face < mesh.face_count(); ++face) {
     const uint32_t end = mesh.face_begin[face + 1];
     if (keep(begin, end)) {
-      for (uint32_t i = begin; i < end; ++i, ++corners) {
-        mesh.corner_position[corners] = mesh.corner_position[i];
-        if (!mesh.corner_uv.empty()) mesh.corner_uv[corners] = mesh.corner_uv[i];
-        if (!mesh.corner_color.empty()) mesh.corner_color[corners] = mesh.corner_color[i];
-      }
-      mesh.face_material[faces] = mesh.face_material[face];
-      mesh.face_begin[++faces] = static_cast<uint32_t>(corners);
-    } else {
-      ++dropped;
+      for_each_corner_array(mesh, [&](auto& array) {
+        if (!array.empty()) std::copy(array.begin() + begin, array.begin() + end, array.begin() + corners);
+      });
+      corners += end - begin;
+      mesh.face_material[number.size()] = mesh.face_material[face];
+      number.push_back(face);
+      mesh.face_begin[number.size()] = corners;
     }
     begin = end;
   }
-  mesh.corner_position.resize(corners);
-  if (!mesh.corner_uv.empty()) mesh.corner_uv.resize(corners);
-  if (!mesh.corner_color.empty()) mesh.corner_color.resize(corners);
-  mesh.face_material.resize(faces);
-  mesh.face_begin.resize(faces + 1);
+  const size_t dropped = mesh.face_count() - number.size();
+  for_each_corner_array(mesh, [&](auto& array) {
+    if (!array.empty()) array.resize(corners);
+  });
+  mesh.face_material.resize(number.size());
+  mesh.face_begin.resize(number.size() + 1);
   return dropped;
 }
 
-void drop_faces_that_are_not_finite(SourceMesh& mesh) {
-  const size_t dropped = remove_faces(mesh, [&](uint32_t begin, uint32_t end) {
+/// Returns the former numbers of the faces that stay.
+std::vector<uint32_t> drop_faces_that_are_not_finite(SourceMesh& mesh) {
+  std::vector<uint32_t> number;
+  const size_t dropped = remove_faces(mesh, number, [&](uint32_t begin, uint32_t end) {
     return std::all_of(mesh.corner_position.begin() + begin, mesh.corner_position.begin() + end, [&](uint32_t v) {
       const dvec3& p = mesh.positions[v];
       return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
@@ -69,6 +75,7 @@ void drop_faces_that_are_not_finite(SourceMesh& mesh) {
   });
   if (dropped > 0)
     mesh.warnings.push_back(fmt::format("{} faces have coordinates that are not finite; dropped", dropped));
+  return number;
 }
 
 /// Where the surface's own origin goes. Errors: nothing there, or a size that single precision cannot work in.
@@ -94,13 +101,6 @@ Result<dvec3> choose_origin(const SourceMesh& mesh, const std::string& name) {
 
 // ---- triangles
 
-/// The corners (indices into SourceMesh's corner arrays) of one triangle of a face.
-struct CornerTriangle {
-  uvec3 corner;
-  uvec3 vertex;  ///< welded
-  uint32_t material;
-};
-
 /// Points of a welded face without repeated neighbours: the corners that stay, in order.
 void distinct_corners(const SourceMesh& mesh, const WeldResult& welded, uint32_t begin, uint32_t end,
                       std::vector<uint32_t>& corners) {
@@ -112,231 +112,116 @@ void distinct_corners(const SourceMesh& mesh, const WeldResult& welded, uint32_t
   while (corners.size() > 1 && vertex(corners.front()) == vertex(corners.back())) corners.pop_back();
 }
 
-/// Twice the area vector, in double: single precision calls needles flat.
-dvec3 area_vector(const std::vector<vec3>& positions, const uvec3& t) {
-  const dvec3 a(positions[t.x]), b(positions[t.y]), c(positions[t.z]);
-  return glm::cross(b - a, c - a);
-}
-
 struct TriangleKeyHash {
   size_t operator()(const uvec3& t) const { return mix64(mix64(t.x, t.y), t.z); }
 };
 
-std::vector<CornerTriangle> triangulate(SourceMesh& mesh, const WeldResult& welded) {
-  std::vector<CornerTriangle> out;
-  out.reserve(mesh.corner_count() - std::min(mesh.corner_count(), 2 * mesh.face_count()));
-  std::unordered_set<uvec3, TriangleKeyHash> seen;
-  seen.reserve(out.capacity());
-  size_t degenerate = 0, repeated = 0;
-  std::vector<uint32_t> corners;
-  std::vector<dvec3> points;
-  for (size_t face = 0; face < mesh.face_count(); ++face) {
-    distinct_corners(mesh, welded, mesh.face_begin[face], mesh.face_begin[face + 1], corners);
-    points.clear();
-    for (const uint32_t c : corners) points.emplace_back(welded.positions[welded.vertex_of[mesh.corner_position[c]]]);
-    bool has_area = false;
-    for (const uvec3& t : triangulate_polygon(points)) {
-      CornerTriangle triangle{{corners[t.x], corners[t.y], corners[t.z]}, {}, mesh.face_material[face]};
-      for (int k = 0; k < 3; ++k) triangle.vertex[k] = welded.vertex_of[mesh.corner_position[triangle.corner[k]]];
-      const dvec3 area = area_vector(welded.positions, triangle.vertex);
-      if (!(glm::dot(area, area) > 0)) continue;
-      has_area = true;
-      uvec3 key = triangle.vertex;
-      if (key.x > key.y) std::swap(key.x, key.y);
-      if (key.y > key.z) std::swap(key.y, key.z);
-      if (key.x > key.y) std::swap(key.x, key.y);
-      if (!seen.insert(key).second) {
-        ++repeated;
-        continue;
-      }
-      out.push_back(triangle);
-    }
-    if (!has_area) ++degenerate;
-  }
-  if (degenerate > 0) mesh.warnings.push_back(fmt::format("{} faces have no area; dropped", degenerate));
-  if (repeated > 0) {
-    mesh.warnings.push_back(fmt::format("{} triangles repeat an earlier one with the same corners; dropped", repeated));
-  }
-  return out;
-}
-
-// ---- materials and masks
-
-/// Turns triangles with corner attributes into a surface with a material per face.
-class SurfaceBuilder {
+/// Appends the triangles of the mesh's polygons to a surface that has their vertices.
+class Triangulation {
  public:
-  SurfaceBuilder(const SourceMesh& mesh, std::vector<vec3> positions, const Job& job) : mesh_(mesh), job_(job) {
-    surface_.positions = std::move(positions);
-  }
+  Triangulation(SourceMesh& mesh, const WeldResult& welded, SourceSurface& surface)
+      : mesh_(mesh), welded_(welded), surface_(surface) {}
 
-  Surface build(const std::vector<CornerTriangle>& triangles) {
-    find_patterns(triangles);
-    std::vector<FaceMaterial> materials(triangles.size());
-    parallel_for(triangles.size(), 1024, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end; ++i) {
-        if (pattern_of_[i] == kNoIndex) materials[i] = plain_material(triangles[i]);
-      }
-    });
-    for (size_t i = 0; i < triangles.size(); ++i) {
-      if (pattern_of_[i] == kNoIndex) {
-        surface_.triangles.push_back(triangles[i].vertex);
-        surface_.materials.push_back(materials[i]);
-      } else {
-        add_pieces(triangles[i], patterns_[pattern_of_[i]]);
-      }
+  void run(const std::vector<uint32_t>& source_face) {
+    for (size_t face = 0; face < mesh_.face_count(); ++face) add_face(face, source_face[face]);
+    if (degenerate_ > 0) mesh_.warnings.push_back(fmt::format("{} faces have no area; dropped", degenerate_));
+    if (repeated_ > 0) {
+      mesh_.warnings.push_back(
+          fmt::format("{} triangles repeat an earlier one with the same corners; dropped", repeated_));
     }
-    drop_unused_vertices();
-    return std::move(surface_);
   }
 
  private:
-  /// A cut and the textures of its pieces; shared by all triangles that look the same in UV space, as leaf cards do.
-  struct Pattern {
-    uint32_t material;
-    MaskedTriangle triangle;
-    CutPattern cut;
-    std::vector<TextureAverage> averages;  ///< per piece
-  };
-
-  UvTriangle uv_of(const CornerTriangle& t) const {
-    UvTriangle uv;
-    for (int k = 0; k < 3; ++k) {
-      uv[static_cast<size_t>(k)] = mesh_.corner_uv.empty() ? vec2(NAN) : mesh_.corner_uv[t.corner[k]];
+  void add_face(size_t face, uint32_t source_face) {
+    distinct_corners(mesh_, welded_, mesh_.face_begin[face], mesh_.face_begin[face + 1], corners_);
+    points_.clear();
+    for (const uint32_t c : corners_) points_.emplace_back(surface_.positions[vertex_of(c)]);
+    bool has_area = false;
+    for (const uvec3& t : triangulate_polygon(points_)) {
+      has_area |= add_triangle({corners_[t.x], corners_[t.y], corners_[t.z]}, mesh_.face_material[face], source_face);
     }
-    return uv;
+    if (!has_area) ++degenerate_;
   }
 
-  vec3 color_of(const CornerTriangle& t) const {
-    if (mesh_.corner_color.empty()) return vec3(1.0f);
-    return vec3(mesh_.corner_color[t.corner.x] + mesh_.corner_color[t.corner.y] + mesh_.corner_color[t.corner.z]) /
-           3.0f;
-  }
-
-  vec3 normal_of(const uvec3& t) const { return vec3(glm::normalize(area_vector(surface_.positions, t))); }
-
-  FaceMaterial plain_material(const CornerTriangle& t) const {
-    const SourceMaterial& material = mesh_.materials[t.material];
-    return face_material(material, average_textures(material, uv_of(t)), color_of(t), normal_of(t.vertex));
-  }
-
-  /// Gives each masked triangle its pattern, and cuts all patterns.
-  void find_patterns(const std::vector<CornerTriangle>& triangles) {
-    pattern_of_.assign(triangles.size(), kNoIndex);
-    std::unordered_map<uint64_t, std::vector<uint32_t>> by_hash;
-    std::vector<std::vector<MaskedTriangle>> of_material(mesh_.materials.size());
-    for (size_t i = 0; i < triangles.size(); ++i) {
-      const CornerTriangle& t = triangles[i];
-      if (mesh_.materials[t.material].alpha_mode == AlphaMode::Opaque) continue;
-      MaskedTriangle masked{uv_of(t), {1, 1, 1}};
-      if (!mesh_.corner_color.empty()) {
-        for (int k = 0; k < 3; ++k) masked.alpha[static_cast<size_t>(k)] = mesh_.corner_color[t.corner[k]].w;
-      }
-      // Without usable coordinates only the factor and the vertices can say anything.
-      if (!has_maps_with_alpha(t.material)) masked.uv = UvTriangle{};
-      auto& same_hash = by_hash[hash_values<MaskedTriangle>({&masked, 1}, t.material)];
-      const auto found = std::find_if(same_hash.begin(), same_hash.end(), [&](uint32_t p) {
-        return patterns_[p].material == t.material && patterns_[p].triangle == masked;
-      });
-      if (found != same_hash.end()) {
-        pattern_of_[i] = *found;
-        continue;
-      }
-      pattern_of_[i] = static_cast<uint32_t>(patterns_.size());
-      same_hash.push_back(pattern_of_[i]);
-      patterns_.push_back({t.material, masked, {}, {}});
-      of_material[t.material].push_back(masked);
+  /// False: it has no area.
+  bool add_triangle(const uvec3& corner, uint32_t material, uint32_t source_face) {
+    surface_.triangles.push_back({vertex_of(corner.x), vertex_of(corner.y), vertex_of(corner.z)});
+    const dvec3 area = surface_.area_vector(surface_.triangles.size() - 1);
+    const bool has_area = glm::dot(area, area) > 0;
+    if (!has_area || !is_first(surface_.triangles.back())) {
+      surface_.triangles.pop_back();
+      return has_area;
     }
-    std::vector<int> subdivisions;
-    for (size_t m = 0; m < of_material.size(); ++m) {
-      subdivisions.push_back(cut_subdivisions(mesh_.materials[m], of_material[m]));
-    }
-    parallel_for(patterns_.size(), 1, [&](size_t begin, size_t end) {
-      for (size_t p = begin; p < end && !job_.is_cancelled(); ++p)
-        fill_pattern(patterns_[p], subdivisions[patterns_[p].material]);
-    });
+    surface_.material.push_back(material);
+    surface_.source_face.push_back(source_face);
+    add_corners(corner, mesh_.corner_uv, surface_.corner_uv);
+    add_corners(corner, mesh_.corner_color, surface_.corner_color);
+    add_corners(corner, mesh_.corner_normal, surface_.corner_normal);
+    return true;
   }
 
-  bool has_maps_with_alpha(uint32_t material) const {
-    return mesh_.materials[material].base_color_map || mesh_.materials[material].alpha_map;
+  bool is_first(uvec3 t) {
+    if (t.x > t.y) std::swap(t.x, t.y);
+    if (t.y > t.z) std::swap(t.y, t.z);
+    if (t.x > t.y) std::swap(t.x, t.y);
+    const bool is_new = seen_.insert(t).second;
+    repeated_ += !is_new;
+    return is_new;
   }
 
-  void fill_pattern(Pattern& pattern, int subdivisions) const {
-    const SourceMaterial& material = mesh_.materials[pattern.material];
-    pattern.cut = cut_by_mask(material, pattern.triangle, subdivisions);
-    for (const uvec3& t : pattern.cut.triangles) {
-      UvTriangle uv;
-      for (int k = 0; k < 3; ++k) {
-        const vec3& b = pattern.cut.vertices[t[k]];
-        const UvTriangle& whole = pattern.triangle.uv;
-        uv[static_cast<size_t>(k)] = b.x * whole[0] + b.y * whole[1] + b.z * whole[2];
-      }
-      pattern.averages.push_back(average_textures(material, uv));
-    }
+  template <typename T>
+  static void add_corners(const uvec3& corner, const std::vector<T>& from, std::vector<T>& to) {
+    if (from.empty()) return;
+    for (int k = 0; k < 3; ++k) to.push_back(from[corner[k]]);
   }
 
-  void add_pieces(const CornerTriangle& t, const Pattern& pattern) {
-    std::vector<uint32_t> vertices;
-    for (const vec3& barycentric : pattern.cut.vertices) vertices.push_back(vertex_at(t.vertex, barycentric));
-    const vec3 normal = normal_of(t.vertex), color = color_of(t);
-    for (size_t i = 0; i < pattern.cut.triangles.size(); ++i) {
-      const uvec3& piece = pattern.cut.triangles[i];
-      const uvec3 triangle(vertices[piece.x], vertices[piece.y], vertices[piece.z]);
-      const bool is_collapsed = triangle.x == triangle.y || triangle.y == triangle.z || triangle.z == triangle.x;
-      const dvec3 area = area_vector(surface_.positions, triangle);
-      if (is_collapsed || !(glm::dot(area, area) > 0)) continue;  // too small for single precision here
-      surface_.triangles.push_back(triangle);
-      surface_.materials.push_back(face_material(mesh_.materials[t.material], pattern.averages[i], color, normal));
-    }
-  }
+  uint32_t vertex_of(uint32_t corner) const { return welded_.vertex_of[mesh_.corner_position[corner]]; }
 
-  /// The vertex at a point of a triangle: its corners are those of the mesh, points on its edges are shared with the
-  /// neighbours that were cut at the same place.
-  uint32_t vertex_at(const uvec3& corners, const vec3& barycentric) {
-    for (int k = 0; k < 3; ++k) {
-      if (barycentric[k] == 1.0f) return corners[k];
-    }
-    for (int k = 0; k < 3; ++k) {
-      if (barycentric[k] != 0.0f) continue;
-      int a = (k + 1) % 3, b = (k + 2) % 3;
-      if (corners[a] > corners[b]) std::swap(a, b);
-      uint32_t bits;
-      std::memcpy(&bits, &barycentric[b], sizeof bits);
-      const auto [found, is_new] =
-          on_edge_.try_emplace(uvec3(corners[a], corners[b], bits), static_cast<uint32_t>(surface_.positions.size()));
-      if (is_new) {
-        surface_.positions.push_back(
-            glm::mix(surface_.positions[corners[a]], surface_.positions[corners[b]], barycentric[b]));
-      }
-      return found->second;
-    }
-    surface_.positions.push_back(barycentric.x * surface_.positions[corners.x] +
-                                 barycentric.y * surface_.positions[corners.y] +
-                                 barycentric.z * surface_.positions[corners.z]);
-    return static_cast<uint32_t>(surface_.positions.size() - 1);
-  }
-
-  void drop_unused_vertices() {
-    std::vector<uint32_t> target(surface_.positions.size(), kNoIndex);
-    std::vector<vec3> kept;
-    for (uvec3& t : surface_.triangles) {
-      for (int k = 0; k < 3; ++k) {
-        if (target[t[k]] == kNoIndex) {
-          target[t[k]] = static_cast<uint32_t>(kept.size());
-          kept.push_back(surface_.positions[t[k]]);
-        }
-        t[k] = target[t[k]];
-      }
-    }
-    surface_.positions = std::move(kept);
-  }
-
-  const SourceMesh& mesh_;
-  const Job& job_;
-  Surface surface_;
-  std::vector<uint32_t> pattern_of_;  ///< per triangle; kNoIndex: not masked
-  std::vector<Pattern> patterns_;
-  std::unordered_map<uvec3, uint32_t, TriangleKeyHash> on_edge_;
+  SourceMesh& mesh_;
+  const WeldResult& welded_;
+  SourceSurface& surface_;
+  std::unordered_set<uvec3, TriangleKeyHash> seen_;
+  size_t degenerate_ = 0, repeated_ = 0;
+  std::vector<uint32_t> corners_;
+  std::vector<dvec3> points_;
 };
+
+void drop_unused_vertices(SourceSurface& surface) {
+  std::vector<uint32_t> target(surface.positions.size(), kNoIndex);
+  std::vector<vec3> kept;
+  for (uvec3& t : surface.triangles) {
+    for (int k = 0; k < 3; ++k) {
+      if (target[t[k]] == kNoIndex) {
+        target[t[k]] = static_cast<uint32_t>(kept.size());
+        kept.push_back(surface.positions[t[k]]);
+      }
+      t[k] = target[t[k]];
+    }
+  }
+  surface.positions = std::move(kept);
+}
+
+/// Makes shading normals unit; where the source gives none that is usable, the face's own. Leaves them out altogether
+/// where they say nothing new, as of flat-shaded exports.
+void tidy_normals(SourceSurface& surface, std::vector<std::string>& warnings) {
+  constexpr float kSameCosine = 0.999999f;  // 0.08 degrees
+  bool is_smooth = false;
+  size_t unusable = 0;
+  for (size_t corner = 0; corner < surface.corner_normal.size(); ++corner) {
+    vec3& normal = surface.corner_normal[corner];
+    const vec3 own(glm::normalize(surface.area_vector(corner / 3)));
+    const float largest = max_component(glm::abs(normal));
+    if (largest > 0 && is_finite(normal)) {
+      normal = glm::normalize(normal / largest);
+    } else {
+      unusable += largest != 0;
+      normal = own;
+    }
+    is_smooth |= std::abs(glm::dot(normal, own)) < kSameCosine;
+  }
+  if (unusable > 0) warnings.push_back(fmt::format("{} normals are not finite; ignored", unusable));
+  if (!is_smooth) surface.corner_normal = {};
+}
 
 /// One line each, and not a thousand of them.
 std::vector<std::string> limit(std::vector<std::string> warnings) {
@@ -349,8 +234,8 @@ std::vector<std::string> limit(std::vector<std::string> warnings) {
 
 }  // namespace
 
-Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name, const Job& job) {
-  drop_faces_that_are_not_finite(mesh);
+Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name) {
+  const std::vector<uint32_t> source_face = drop_faces_that_are_not_finite(mesh);
   FARFIELD_TRY_LET(const auto origin, choose_origin(mesh, name));
   std::vector<vec3> positions;
   positions.reserve(mesh.positions.size());
@@ -361,24 +246,28 @@ Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name, const 
   if (100 * welded.near_welds > welded.positions.size()) {  // a few happen in any large mesh
     mesh.warnings.push_back(fmt::format("{} vertices joined with others within rounding of them", welded.near_welds));
   }
-  const std::vector<CornerTriangle> triangles = triangulate(mesh, welded);
 
   ImportedAsset asset;
-  asset.surface = SurfaceBuilder(mesh, std::move(welded.positions), job).build(triangles);
-  if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, fmt::format("{}: cancelled", name));
-  asset.surface.origin = origin;
-  if (asset.surface.triangles.empty()) {
+  SourceSurface& surface = asset.source;
+  surface.origin = origin;
+  surface.positions = std::move(welded.positions);
+  surface.materials = std::move(mesh.materials);
+  surface.material_function = std::move(mesh.material_function);
+  Triangulation(mesh, welded, surface).run(source_face);
+  if (surface.triangles.empty()) {
     return make_error(ErrorCode::BadFile, fmt::format("{}: no face has any area", name));
   }
+  drop_unused_vertices(surface);
+  tidy_normals(surface, mesh.warnings);
   asset.source_hash = mesh.source_hash;
   asset.source_files = std::move(mesh.source_files);
   asset.warnings = limit(std::move(mesh.warnings));
   return asset;
 }
 
-Result<ImportedAsset> import_asset(const fs::path& path, const ImportOptions& options, const Job& job) {
+Result<ImportedAsset> import_asset(const fs::path& path, const ImportOptions& options) {
   FARFIELD_TRY_LET(auto mesh, read_source(path, options));
-  return condition(std::move(mesh), path.string(), job);
+  return condition(std::move(mesh), path.string());
 }
 
 }  // namespace farfield

@@ -49,58 +49,91 @@ const Texture::Level& matching_level(const Texture& image, int width) {
 
 /// The texture whose texels are walked; the others are looked up at their centres.
 const SourceTexture& driver(const SourceMaterial& m) {
-  return m.base_color_map ? m.base_color_map : m.metallic_roughness_map ? m.metallic_roughness_map : m.alpha_map;
+  for (const SourceTexture* map : {&m.base_color_map, &m.metallic_roughness_map, &m.alpha_map, &m.normal_map}) {
+    if (*map) return *map;
+  }
+  return m.emission_map;
 }
 
-/// Sums of what TextureAverage holds, over texels of one level of the driving texture.
+/// The normal that a normal map's texel means. Of texels that are averages themselves a mean, shorter than 1.
+vec3 decode_normal(const vec4& texel, float scale, bool is_average) {
+  const vec3 normal = (2.0f * vec3(texel) - 1.0f) * vec3(scale, scale, 1);
+  const float length = glm::length(normal);
+  if (!(length > 1e-6f)) return {0, 0, 1};
+  return is_average && length < 1 ? normal : normal / length;
+}
+
+/// Sums of what MapMeans holds, over texels of one level of the driving texture.
 class Accumulator {
  public:
-  Accumulator(const SourceMaterial& material, int width) : material_(material), width_(width) {}
+  Accumulator(const SourceMaterial& material, float vertex_alpha, int width)
+      : material_(material), own_alpha_(material.alpha * vertex_alpha), width_(width) {}
 
   /// One sample with its premultiplied base colour (of the driver's texel, where that is the base colour map).
   void add(const vec4& base, vec2 uv, float area) {
     float alpha = base.w;
-    if (material_.alpha_map) {
-      alpha *= sample_bilinear(material_.alpha_map, matching_level(*material_.alpha_map.image, width_), uv).w;
-    }
-    const float weight = area * (base.w > 0 ? alpha / base.w : 0.0f);  // base is multiplied with its own alpha already
+    if (material_.alpha_map) alpha *= look_up(material_.alpha_map, uv).w;
+    const float shown = area * (base.w > 0 ? alpha / base.w : 0.0f);  // base is multiplied with its own alpha already
+    const float weight = shown * base.w;
     float metallic = material_.metallic, roughness = material_.roughness;
     if (material_.metallic_roughness_map) {
-      const vec4 mr = sample_bilinear(material_.metallic_roughness_map,
-                                      matching_level(*material_.metallic_roughness_map.image, width_), uv);
+      const vec4 mr = look_up(material_.metallic_roughness_map, uv);
       roughness *= mr.y;
       metallic *= mr.z;
     }
-    const float roughness2 = roughness * roughness * roughness * roughness;
-    sum_.dielectric += weight * (1 - metallic) * vec3(base);
-    sum_.metal += weight * metallic * vec3(base);
-    sum_.metallic += weight * base.w * metallic;
-    sum_.roughness2 += weight * base.w * roughness2;
-    total_ += weight * base.w;
+    sum_.dielectric += shown * (1 - metallic) * vec3(base);
+    sum_.metal += shown * metallic * vec3(base);
+    sum_.metallic += weight * metallic;
+    sum_.roughness2 += weight * roughness * roughness * roughness * roughness;
+    sum_.emission += weight * (material_.emission_map ? vec3(look_up(material_.emission_map, uv)) : vec3(1.0f));
+    sum_.normal += weight * normal_at(uv);
+    sum_.opacity += area * opacity(alpha * own_alpha_);
+    shown_ += weight;
+    area_ += area;
   }
 
   /// False when nothing with alpha was added.
-  bool finish(TextureAverage& average) const {
-    if (!(total_ > 1e-12f)) return false;
-    average = {sum_.dielectric / total_, sum_.metal / total_, sum_.metallic / total_, sum_.roughness2 / total_};
+  bool finish(MapMeans& means) const {
+    if (!(shown_ > 1e-12f)) return false;
+    means = {sum_.dielectric / shown_, sum_.metal / shown_,    sum_.metallic / shown_, sum_.roughness2 / shown_,
+             sum_.opacity / area_,     sum_.emission / shown_, sum_.normal / shown_};
     return true;
   }
 
  private:
+  const Texture::Level& level_of(const SourceTexture& map) const { return matching_level(*map.image, width_); }
+  vec4 look_up(const SourceTexture& map, vec2 uv) const { return sample_bilinear(map, level_of(map), uv); }
+
+  vec3 normal_at(vec2 uv) const {
+    if (!material_.normal_map) return {0, 0, 1};
+    const bool is_average = level_of(material_.normal_map).width < material_.normal_map.image->width();
+    return decode_normal(look_up(material_.normal_map, uv), material_.normal_scale, is_average);
+  }
+
+  /// Of a texel that is an average, alpha is the share that a mask leaves.
+  float opacity(float alpha) const {
+    if (material_.alpha_mode == AlphaMode::Opaque) return 1;
+    const SourceTexture& map = material_.base_color_map ? material_.base_color_map : material_.alpha_map;
+    const bool is_average = map && level_of(map).width < map.image->width();
+    if (material_.alpha_mode == AlphaMode::Blend || is_average) return std::clamp(alpha, 0.0f, 1.0f);
+    return alpha >= material_.alpha_cutoff ? 1.0f : 0.0f;
+  }
+
   const SourceMaterial& material_;
+  float own_alpha_;
   int width_;
-  TextureAverage sum_{vec3(0.0f), vec3(0.0f), 0, 0};
-  float total_ = 0;
+  MapMeans sum_{vec3(0.0f), vec3(0.0f), 0, 0, 0, vec3(0.0f), vec3(0.0f)};
+  float shown_ = 0, area_ = 0;
 };
 
 /// Samples a material at texels of its driving texture.
 class TexelWalk {
  public:
-  TexelWalk(const SourceMaterial& material, const Texture::Level& level)
+  TexelWalk(const SourceMaterial& material, float vertex_alpha, const Texture::Level& level)
       : texture_(driver(material)),
         level_(level),
         drives_color_(bool(material.base_color_map)),
-        sums_(material, level.width) {}
+        sums_(material, vertex_alpha, level.width) {}
 
   void add_texel(int x, int y, float area) {
     const vec2 uv((static_cast<float>(x) + 0.5f) / static_cast<float>(level_.width),
@@ -108,7 +141,7 @@ class TexelWalk {
     sums_.add(drives_color_ ? fetch(texture_, level_, x, y) : vec4(1.0f), uv, area);
   }
   void add_point(vec2 uv) { sums_.add(drives_color_ ? sample_bilinear(texture_, level_, uv) : vec4(1.0f), uv, 1); }
-  bool finish(TextureAverage& average) const { return sums_.finish(average); }
+  bool finish(MapMeans& means) const { return sums_.finish(means); }
 
  private:
   const SourceTexture& texture_;
@@ -166,39 +199,37 @@ void rasterize(const std::array<glm::dvec2, 3>& p, const Visit& visit) {
   }
 }
 
-TextureAverage average_whole(const SourceMaterial& material) {
+/// Where nothing has alpha: what the factors alone say, and that it is not there.
+MapMeans invisible(const SourceMaterial& material) {
+  MapMeans means = means_without_maps(material);
+  if (material.alpha_mode != AlphaMode::Opaque) means.opacity = 0;
+  return means;
+}
+
+MapMeans average_whole(const SourceMaterial& material, float vertex_alpha) {
   const Texture& image = *driver(material).image;
   // Down to about 32 x 32 texels, so that products of textures are still taken texel by texel.
-  int index = 0;
-  while (index + 1 < image.level_count() && image.level(index).width > 32) ++index;
-  const Texture::Level& level = image.level(index);
-  TexelWalk walk(material, level);
+  const Texture::Level& level = matching_level(image, 32);
+  TexelWalk walk(material, vertex_alpha, level);
   for (int y = 0; y < level.height; ++y) {
     for (int x = 0; x < level.width; ++x) walk.add_texel(x, y, 1);
   }
-  TextureAverage average;
-  const float roughness2 = std::pow(material.roughness, 4.0f);
-  if (!walk.finish(average)) {
-    average = {vec3(1 - material.metallic), vec3(material.metallic), material.metallic, roughness2};
-  }
-  return average;
+  MapMeans means;
+  return walk.finish(means) ? means : invisible(material);
 }
 
 }  // namespace
 
-bool has_textures(const SourceMaterial& m) { return m.base_color_map || m.metallic_roughness_map || m.alpha_map; }
+bool has_textures(const SourceMaterial& m) { return bool(driver(m)); }
 
 bool is_usable(const UvTriangle& uv) {
   return std::all_of(uv.begin(), uv.end(),
                      [](const vec2& c) { return std::abs(c.x) <= kMaxUv && std::abs(c.y) <= kMaxUv; });
 }
 
-TextureAverage average_textures(const SourceMaterial& material, const UvTriangle& uv) {
-  if (!has_textures(material)) {
-    const float m = material.metallic;
-    return {vec3(1 - m), vec3(m), m, std::pow(material.roughness, 4.0f)};
-  }
-  if (!is_usable(uv)) return average_whole(material);
+MapMeans average_textures(const SourceMaterial& material, const UvTriangle& uv, float vertex_alpha) {
+  if (!has_textures(material)) return means_without_maps(material, vertex_alpha);
+  if (!is_usable(uv)) return average_whole(material, vertex_alpha);
 
   const Texture& image = *driver(material).image;
   const auto to_texels = [&](const Texture::Level& level) {
@@ -215,11 +246,11 @@ TextureAverage average_textures(const SourceMaterial& material, const UvTriangle
   };
   while (index + 1 < image.level_count() && is_too_many(image.level(index))) ++index;
   // Still too many of single texels: the texture repeats thousands of times within the triangle.
-  if (is_too_many(image.level(index))) return average_whole(material);
+  if (is_too_many(image.level(index))) return average_whole(material, vertex_alpha);
 
   const Texture::Level& level = image.level(index);
   const auto p = to_texels(level);
-  TexelWalk walk(material, level);
+  TexelWalk walk(material, vertex_alpha, level);
   const double area = 0.5 * std::abs((p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x));
   if (area > 1e-9) {
     rasterize(p, [&](int x, int y, double part) { walk.add_texel(x, y, static_cast<float>(part / area)); });
@@ -230,24 +261,18 @@ TextureAverage average_textures(const SourceMaterial& material, const UvTriangle
       for (size_t k = 0; k < 3; ++k) walk.add_point(glm::mix(uv[k], uv[(k + 1) % 3], t));
     }
   }
-  TextureAverage average;
-  return walk.finish(average) ? average : average_whole(material);
+  MapMeans means;
+  return walk.finish(means) ? means : invisible(material);
 }
 
-FaceMaterial face_material(const SourceMaterial& material, const TextureAverage& average, const vec3& color,
-                           const vec3& normal) {
-  const vec3 base = glm::clamp(material.base_color * color, vec3(0.0f), vec3(1.0f));
-  FaceMaterial out;
-  out.sggx = SymMat3::outer(normal);
-  out.specular =
-      glm::clamp(material.dielectric_f0 * (1 - average.metallic) + base * average.metal, vec3(0.0f), vec3(1.0f));
-  const vec3 room = 1.0f - out.specular;
-  const float through = material.diffuse_transmission;
-  out.diffuse = glm::min(base * average.dielectric * (1 - through) * room, room);
-  out.transmission =
-      glm::min(material.diffuse_transmission_color * (through * (1 - average.metallic)) * room, room - out.diffuse);
-  out.roughness2 = std::clamp(average.roughness2, 0.0f, 1.0f);
-  return out;
+MapMeans textures_at(const SourceMaterial& material, vec2 uv, float width, float vertex_alpha) {
+  if (!has_textures(material)) return means_without_maps(material, vertex_alpha);
+  if (!is_usable({uv, uv, uv})) return average_whole(material, vertex_alpha);
+  const float texels = 1 / std::max(width, 1e-6f);
+  TexelWalk walk(material, vertex_alpha, matching_level(*driver(material).image, static_cast<int>(texels)));
+  walk.add_point(uv);
+  MapMeans means;
+  return walk.finish(means) ? means : invisible(material);
 }
 
 float alpha_at(const SourceMaterial& material, vec2 uv) {

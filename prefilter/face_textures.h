@@ -2,34 +2,21 @@
 // What a textured triangle reflects on average: textures are integrated exactly over its footprint in UV space.
 #pragma once
 
-#include <array>
-
 #include "import/source_mesh.h"
-#include "prefilter/surface.h"
+#include "prefilter/source_surface.h"
+#include "scattering/material_model.h"
 
 namespace farfield {
 
-/// Texture coordinates of a triangle's corners.
-using UvTriangle = std::array<vec2, 3>;
+/// What a material's maps say on average over the triangle with these texture coordinates: texels weighted by the exact
+/// area that the triangle covers of them, or of texels of a smaller level of the image when it covers very many; and by
+/// alpha. Coordinates that are not finite or beyond 1e6 give the average of the whole image, a triangle without area in
+/// UV space the texels along it. `vertex_alpha` multiplies alpha.
+MapMeans average_textures(const SourceMaterial& material, const UvTriangle& uv, float vertex_alpha = 1);
 
-/// Averages over an area of a material's textures, each weighted by alpha when the material is masked. Without the base
-/// colour factor and the vertex colour, which are constant there and come in afterwards.
-struct TextureAverage {
-  vec3 dielectric{1.0f};  ///< base colour times (1 - metallic)
-  vec3 metal{0.0f};       ///< base colour times metallic
-  float metallic = 0;
-  float roughness2 = 1;  ///< roughness^4, which is alpha^2 of GGX
-};
-
-/// Of the triangle with these texture coordinates: texels weighted by the exact area that the triangle covers of them,
-/// or of texels of a smaller level of the image when it covers very many. Coordinates that are not finite or beyond
-/// 1e6 give the average of the whole image, a triangle without area in UV space the texels along it.
-TextureAverage average_textures(const SourceMaterial& material, const UvTriangle& uv);
-
-/// The material of a face. `color`: the mean vertex colour, linear. `normal`: unit. What the specular lobe takes at
-/// normal incidence is left out of the diffuse one, so diffuse + transmission + specular <= 1 per channel.
-FaceMaterial face_material(const SourceMaterial& material, const TextureAverage& average, const vec3& color,
-                           const vec3& normal);
+/// The same of a spot of this width, in texture coordinates, around a point: maps scaled down so that a texel is about
+/// as large are looked at, bilinear.
+MapMeans textures_at(const SourceMaterial& material, vec2 uv, float width, float vertex_alpha = 1);
 
 /// Alpha at a point of the material's textures, bilinear, times the material's own alpha.
 float alpha_at(const SourceMaterial& material, vec2 uv);

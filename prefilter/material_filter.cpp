@@ -10,9 +10,9 @@ namespace farfield {
 
 FaceMaterial mix(const FaceMaterial& a, float factor_a, const FaceMaterial& b, float factor_b) {
   const auto mean = [&](auto FaceMaterial::*channel) { return a.*channel * factor_a + b.*channel * factor_b; };
-  return {mean(&FaceMaterial::sggx),     mean(&FaceMaterial::shading_sggx), mean(&FaceMaterial::diffuse),
-          mean(&FaceMaterial::specular), mean(&FaceMaterial::transmission), mean(&FaceMaterial::roughness2),
-          mean(&FaceMaterial::opacity),  mean(&FaceMaterial::emission)};
+  return {mean(&FaceMaterial::sggx),         mean(&FaceMaterial::diffuse),    mean(&FaceMaterial::specular),
+          mean(&FaceMaterial::transmission), mean(&FaceMaterial::roughness2), mean(&FaceMaterial::shading_sggx),
+          mean(&FaceMaterial::opacity),      mean(&FaceMaterial::emission)};
 }
 
 void filter_materials(std::span<const double> area_before, std::span<const double> area_after,

@@ -11,15 +11,15 @@
 
 namespace farfield {
 
-/// Prefilterable reflectance of one face. All linear RGB, in [0, 1] where nothing
-/// else is said; all channels average linearly (thesis 8.3.5).
+/// Prefilterable reflectance of one face. All linear RGB, in [0, 1] where nothing else is said; all channels average
+/// linearly (thesis 8.3.5).
 struct FaceMaterial {
   SymMat3 sggx;             ///< distribution of normals, local space, n n^T for a flat face
-  SymMat3 shading_sggx;     ///< the same of shading normals; 0 on all faces of a surface that has no such normals
   vec3 diffuse{0.0f};       ///< diffuse albedo
   vec3 specular{0.0f};      ///< reflectance at normal incidence (F0)
   vec3 transmission{0.0f};  ///< diffuse transmission albedo; diffuse + transmission <= 1
   float roughness2 = 1.0f;  ///< alpha^2 of the specular GGX lobe, alpha = roughness^2 (glTF roughness)
+  SymMat3 shading_sggx;     ///< the same of shading normals; 0 on all faces of a surface that has no such normals
   float opacity = 1.0f;     ///< share of rays that the face stops
   vec3 emission{0.0f};      ///< linear radiance of both sides, >= 0, may exceed 1
 };

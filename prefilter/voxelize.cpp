@@ -31,6 +31,8 @@ constexpr double kReach = 1;
 constexpr float kEscapeLength = 0.5f;
 /// In voxels: light that goes on starts this far from the face it leaves.
 constexpr float kClearance = 1e-3f;
+/// In voxels: a ray that passes a face goes on this far behind it.
+constexpr float kPassed = 1e-5f;
 
 constexpr uint32_t kMaxRayFactor = 16;    ///< how many times more rays than asked for a voxel may get
 constexpr uint32_t kEnoughMisses = 16;    ///< rays that must get through for a transmittance with 25 % noise
@@ -40,7 +42,7 @@ constexpr uint64_t kManyVoxels = 50'000;  ///< fewer voxels share the rays of th
 struct HitSums {
   uint32_t hits = 0;
   SymMat3 sggx;
-  vec3 diffuse{0.0f}, specular{0.0f}, transmission{0.0f};
+  vec3 diffuse{0.0f}, specular{0.0f}, transmission{0.0f}, emission{0.0f};
   float roughness2_weight = 0, roughness2 = 0;  ///< weighted by the specular reflectance whose lobe it is
 
   void add(const FaceMaterial& m) {
@@ -49,6 +51,7 @@ struct HitSums {
     diffuse += m.diffuse;
     specular += m.specular;
     transmission += m.transmission;
+    emission += m.emission;
     const float weight = component_sum(m.specular);
     roughness2_weight += weight;
     roughness2 += weight * m.roughness2;
@@ -117,6 +120,7 @@ struct VoxelRays {
   const RayScene& scene;
   vec3 center;
   float size;  ///< of the voxel, and the length of the rays
+  bool is_opaque;
   HitSums hits{};
   EscapeSums escape{};
 
@@ -127,23 +131,44 @@ struct VoxelRays {
       const vec3 middle = center + size * sampler.middle(random.next());
       const vec3 direction = sampler.direction(random.next());
       const vec3 origin = middle - 0.5f * size * direction;
-      const auto hit = scene.first_hit(origin, direction, size);
+      const auto hit = first_stop(origin, direction, size, random);
       if (!hit) continue;
       hits.add(geometry.materials[hit->triangle]);
-      scatter(origin, direction, *hit, random.next());
+      scatter(origin, direction, *hit, random);
     }
+  }
+
+  /// The first face that stops the ray: faces that are not opaque let some pass.
+  std::optional<RayHit> first_stop(const vec3& origin, const vec3& direction, float length, SplitMix& random) const {
+    float passed = 0;
+    while (true) {
+      const auto hit = scene.first_hit(origin + passed * direction, direction, length - passed);
+      if (!hit) return {};
+      const float opacity = geometry.materials[hit->triangle].opacity;
+      if (opacity >= 1 || to_unit_float(random.next()) < opacity) {
+        return RayHit{hit->triangle, passed + hit->distance, hit->normal};
+      }
+      passed += hit->distance + kPassed * size;
+      if (!(passed < length)) return {};
+    }
+  }
+
+  bool is_blocked(const vec3& origin, const vec3& direction, float near, float far, SplitMix& random) const {
+    if (is_opaque) return scene.is_occluded(origin, direction, near, far);
+    return far > near && first_stop(origin + near * direction, direction, far - near, random).has_value();
   }
 
   /// Sends on the light of a hit. What is hidden from where the ray came from, within its length, does not count:
   /// nobody sees it, and the inside of solid twigs is of that kind.
-  void scatter(const vec3& origin, const vec3& direction, const RayHit& hit, uint64_t bits) {
+  void scatter(const vec3& origin, const vec3& direction, const RayHit& hit, SplitMix& random) {
+    const uint64_t bits = random.next();
     if (!(max_component(glm::abs(hit.normal)) >= std::numeric_limits<float>::min())) return;  // no face that reflects
-    if (scene.is_occluded(origin, -direction, 0, size - hit.distance)) return;
+    if (is_blocked(origin, -direction, 0, size - hit.distance, random)) return;
     const FaceMaterial& m = geometry.materials[hit.triangle];
     const vec3 away = scattered_direction(m, hit.normal, direction, bits);
     const vec3 point = origin + hit.distance * direction;
     escape.add(away, component_sum(m.diffuse + m.specular + m.transmission),
-               !scene.is_occluded(point, away, kClearance * size, kEscapeLength * size));
+               !is_blocked(point, away, kClearance * size, kEscapeLength * size, random));
   }
 };
 
@@ -154,6 +179,7 @@ struct Measurement {
   const RayScene& scene;
   uint32_t rays;  ///< per voxel
   uint64_t seed;
+  bool is_opaque;  ///< no ray passes any face
 };
 
 SplitMix random_of_voxel(const ivec3& coordinate, uint64_t seed) {
@@ -179,7 +205,7 @@ Voxel measure_voxel(const Measurement& m, const ivec3& coordinate) {
   const vec3 center(m.lattice.origin + (dvec3(coordinate) + 0.5) * size);
   SplitMix random = random_of_voxel(coordinate, m.seed);
 
-  VoxelRays voxel_rays{m.geometry, m.scene, center, static_cast<float>(size)};
+  VoxelRays voxel_rays{m.geometry, m.scene, center, static_cast<float>(size), m.is_opaque};
   const HitSums& sums = voxel_rays.hits;
   uint32_t rays = m.rays;
   voxel_rays.cast(rays, random);
@@ -202,6 +228,7 @@ Voxel measure_voxel(const Measurement& m, const ivec3& coordinate) {
   voxel.diffuse = sums.diffuse * share;
   voxel.specular = sums.specular * share;
   voxel.transmission = sums.transmission * share;
+  voxel.emission = sums.emission * share;
   if (sums.roughness2_weight > 0) voxel.roughness2 = sums.roughness2 / sums.roughness2_weight;
   let_escape(static_cast<float>(voxel_rays.escape.ratio(voxel.sggx, voxel.density, kEscapeLength * size)), voxel);
   return voxel;
@@ -261,7 +288,10 @@ Result<std::vector<std::vector<Voxel>>> measure_bricks(const Surface& geometry, 
   std::vector<std::vector<Voxel>> voxels(candidates.coordinates.size());
   if (voxels.empty()) return voxels;
   FARFIELD_TRY_LET(const RayScene rays, RayScene::build(geometry));
-  const Measurement measurement{geometry, lattice, rays, rays_per_voxel(candidates.size(), options), options.seed};
+  const bool is_opaque =
+      std::ranges::all_of(geometry.materials, [](const FaceMaterial& material) { return material.opacity >= 1; });
+  const Measurement measurement{geometry,     lattice,  rays, rays_per_voxel(candidates.size(), options),
+                                options.seed, is_opaque};
   const size_t first = std::min<uint64_t>(options.bricks.first, voxels.size());
   const size_t last = first + std::min<uint64_t>(options.bricks.count, voxels.size() - first);
   const size_t count = (last - first + stride - 1) / stride;

@@ -24,6 +24,7 @@ struct Voxel {
   vec3 transmission{0.0f};
   float roughness2 = 1.0f;
   float self_shadowing = 1.0f;  ///< A in (0, 1]; 1: none
+  vec3 emission{0.0f};          ///< linear radiance of the flakes, both sides
 };
 
 /// 8^3 voxels of the lattice, from kBrickSide * coordinate upwards.
@@ -57,13 +58,13 @@ struct VoxelizeOptions {
 /// Mean optical depth over a voxel's side below which voxels are thinned out.
 inline constexpr double kFaintestDepth = 0.02;
 
-/// Measures the volume of all triangles of `geometry`, with the rays of thesis algorithm 1, but with their middles in
-/// the voxel. Each voxel that the geometry touches or that is next to such a one gets rays_per_voxel; up to 16 times as
-/// many where almost nothing gets through, and where there are few voxels. Of the voxels fainter than kFaintestDepth
-/// only a random share is kept, with that depth, so that on average nothing is lost. The lattice's origin is in the
-/// space of geometry.positions. Empty geometry gives an empty volume. The result does not depend on the number of
-/// threads. Errors: Cancelled; InvalidArgument (options, or geometry further than about a million voxels from the
-/// origin); Io (out of memory in Embree).
+/// Measures the volume of all triangles of `geometry`, each of which stops as many rays as its opacity says, with the
+/// rays of thesis algorithm 1, but with their middles in the voxel. Each voxel that the geometry touches or that is
+/// next to such a one gets rays_per_voxel; up to 16 times as many where almost nothing gets through, and where there
+/// are few voxels. Of the voxels fainter than kFaintestDepth only a random share is kept, with that depth, so that on
+/// average nothing is lost. The lattice's origin is in the space of geometry.positions. Empty geometry gives an empty
+/// volume. The result does not depend on the number of threads. Errors: Cancelled; InvalidArgument (options, or
+/// geometry further than about a million voxels from the origin); Io (out of memory in Embree).
 Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options);
 
 /// The number of bricks that voxelize() looks at, some of which turn out empty. Fast: no ray is cast.

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "base/parallel.h"
+#include "base/result.h"
 #include "lodselect/footprint.h"
 
 namespace farfield {
@@ -50,25 +51,38 @@ std::vector<PlanAsset> FramePlanner::wanted_assets(const LevelStore& levels) con
   return wanted;
 }
 
+/// Textures come after roots and before finer levels: a close-up with its textures is worth more than a finer level
+/// elsewhere. Where not even the roots leave them room, faces show what they are on average.
+Result<FramePlanner::TexturedPlan> FramePlanner::plan_with_textures(LevelStore& levels) const {
+  const std::vector<PlanAsset> wanted = wanted_assets(levels);
+  FARFIELD_TRY_LET(const auto bare, plan_levels(wanted, options_.budget_bytes, levels.fixed_bytes()));
+  const uint64_t texture_bytes = levels.wanted_texture_bytes(bare);
+  if (texture_bytes == 0) return TexturedPlan{bare, 0};
+  const auto plan = plan_levels(wanted, options_.budget_bytes, levels.fixed_bytes() + texture_bytes);
+  if (plan) return TexturedPlan{*plan, levels.wanted_texture_bytes(*plan)};
+  levels.report_no_room_for_textures(plan.error());
+  return TexturedPlan{bare, 0};
+}
+
 Result<PlanSummary> FramePlanner::plan(LevelStore& levels) {
   if (cameras_.empty() && !options_.forced_lambda) {
     return make_error(ErrorCode::InvalidArgument, "plan_frame() needs a camera: call set_cameras() before");
   }
   levels.stop_loading();
   update_footprints(cameras_);
-  const auto plan = plan_levels(wanted_assets(levels), options_.budget_bytes, levels.fixed_bytes());
+  const auto plan = plan_with_textures(levels);
   if (!plan) {
     update_footprints(planned_cameras_);  // the former plan stays
     return tl::unexpected(plan.error());
   }
   planned_cameras_ = cameras_;
-  levels.apply(*plan);
+  levels.apply(*plan, plan->texture_bytes);
 
   PlanSummary summary;
   for (uint32_t i = 0; i < levels.asset_count(); ++i) {
     summary.finest_level.push_back(levels.asset(i).levels[plan->finest[i]].level);
   }
-  summary.planned_bytes = plan->resident_bytes + plan->build_peak_bytes + levels.fixed_bytes();
+  summary.planned_bytes = plan->resident_bytes + plan->build_peak_bytes + levels.fixed_bytes() + plan->texture_bytes;
   summary.bias = plan->bias;
   return summary;
 }

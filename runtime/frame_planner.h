@@ -28,6 +28,10 @@ class FramePlanner {
   void prefetch(LevelStore& levels) const;
 
  private:
+  struct TexturedPlan : Plan {
+    uint64_t texture_bytes = 0;
+  };
+  Result<TexturedPlan> plan_with_textures(LevelStore& levels) const;
   void update_footprints(const std::vector<TessellationCamera>& of_cameras);
   float wanted_lambda(const InstanceRecord& instance) const;
   std::vector<PlanAsset> wanted_assets(const LevelStore& levels) const;

@@ -6,9 +6,12 @@
 #include "farfield/interaction.h"
 
 #include <algorithm>
+#include <cmath>
 #include <new>
+#include <optional>
 #include <type_traits>
 
+#include "runtime/close_up.h"
 #include "runtime/interaction_model.h"
 
 namespace farfield {
@@ -58,24 +61,50 @@ vec3 color_at(ArrayView<PackedColor> colors, uint32_t i) {
 
 float unorm_at(ArrayView<uint8_t> values, uint32_t i) { return values.empty() ? 1.0f : unpack_unorm8(values[i]); }
 
-/// The face that HitRecord::element (2 * quad + side of its diagonal) means.
-uint32_t face_of(const TracedLevel& level, uint32_t element) {
-  const uint32_t quad = element / 2;
-  const ArrayView<uint32_t> first_face = level.view.quad_first_face;
-  const uint32_t next = quad + 1 < first_face.size() ? first_face[quad + 1] : level.face_count;
-  const bool is_pair = next - first_face[quad] == 2;  // not from `quads`: their pages were given back after the build
-  return first_face[quad] + (is_pair ? element % 2 : 0);  // at a lone triangle's edge rounding may have said 1
+/// Radiance at an element of a level.
+vec3 emission_at(ArrayView<PackedRadiance> radiances, uint32_t i) {
+  return radiances.empty() ? vec3(0.0f) : unpack_radiance(radiances[i]);
 }
 
-SurfaceParams surface_params(const LevelView& level, const InstanceRecord& instance, uint32_t face,
-                             const vec3& normal) {
+/// What is known of a face as a whole, but for its normals.
+SurfaceParams face_params(const LevelView& level, uint32_t face) {
   SurfaceParams params;
-  params.sggx = level.face_sggx.empty() ? SymMat3::outer(normal) : to_world(unpack(level.face_sggx[face]), instance);
   params.diffuse = color_at(level.face_diffuse, face);
   params.specular = color_at(level.face_specular, face);
   params.transmission = color_at(level.face_transmission, face);
   params.roughness2 = unorm_at(level.face_roughness2, face);
   return params;
+}
+
+/// The normal around which a narrow distribution lies, and how far it spreads: like the roughness2 of a GGX lobe.
+/// Nothing for a wide one.
+struct NarrowNormals {
+  vec3 normal;
+  float roughness2;
+};
+std::optional<NarrowNormals> narrow_normals(const SymMat3& s, const vec3& start) {
+  constexpr float kNarrow = 0.55f;  // of the trace: within about 18 degrees
+  const float trace = s.trace();
+  if (!(trace > 0)) return {};
+  vec3 normal = start;
+  for (int i = 0; i < 4; ++i) {  // power iterations: each at least divides the error by 9 where it is narrow
+    const vec3 next = s * normal;
+    const float length = glm::length(next);
+    if (!(length > 1e-6f * trace)) return {};
+    normal = next / length;
+  }
+  const float along = s.quadratic(normal) / trace;
+  if (!(along >= kNarrow)) return {};
+  const float aside = 0.5f * std::max(1 - along, 0.0f);
+  return NarrowNormals{normal, aside / (1 - 2 * aside)};
+}
+
+/// On wo's side of the surface, and not beyond its own horizon.
+vec3 visible_normal(vec3 normal, const vec3& geometric_normal, const vec3& wo) {
+  constexpr float kLeastCosine = 0.02f;
+  if (glm::dot(normal, geometric_normal) < 0.0f) normal = -normal;
+  const float cosine = glm::dot(normal, wo);
+  return cosine >= kLeastCosine ? normal : glm::normalize(normal + (kLeastCosine - cosine) * wo);
 }
 
 FlakeParams flake_params(const LevelView& level, const InstanceRecord& instance, uint32_t voxel) {
@@ -114,6 +143,67 @@ bool is_hit_of(const TracedLevel& level, const HitRecord& hit) {
   return hit.is_volume ? hit.element < level.voxel_count : hit.element / 2 < level.view.quad_first_face.size();
 }
 
+namespace {
+
+/// The close-up of a hit's level, where it has one: fills in what the interaction says of the source.
+std::optional<CloseUpSample> look_closely(const TracedLevel& level, const HitRecord& hit, const vec3& local_direction,
+                                          float local_width, Interaction& interaction) {
+  const uint32_t face = level.face_of(hit.element / 2, hit.element % 2);
+  const vec2 barycentric(hit.barycentric[0], hit.barycentric[1]);
+  const SourcePoint source = source_point(level.view, face, barycentric);
+  interaction.material = source.material;
+  interaction.source_face = source.source_face;
+  interaction.barycentric = source.barycentric;
+  interaction.uv = source.uv;
+  const auto& close_up = static_cast<const CloseUp&>(*level.look);  // the runtime gives levels no other
+  auto sample = close_up.sample(level.view, {face, barycentric, local_direction, local_width});
+  if (sample || source.normal == vec3(0.0f)) return sample;
+  return CloseUpSample{std::nullopt, source.normal};
+}
+
+/// How the surface reflects at a hit, with its geometric normal known; sets the shading normal and what it emits.
+SurfaceParams shade_surface(const TracedLevel& level, const InstanceRecord& instance, const HitRecord& hit,
+                            const vec3& world_direction, Interaction& interaction) {
+  const LevelView& view = level.view;
+  const uint32_t face = level.face_of(hit.element / 2, hit.element % 2);
+  SurfaceParams params = face_params(view, face);
+  interaction.emission = emission_at(view.face_emission, face);
+  vec3 normal = interaction.geometric_normal;
+  bool is_flat = true;
+  if (level.look) {
+    const vec3 local = instance.vector_to_local(world_direction);
+    const float width = hit.footprint * glm::length(local) / glm::length(world_direction);
+    if (const auto sample = look_closely(level, hit, local, width, interaction)) {
+      if (sample->normal != vec3(0.0f)) normal = glm::normalize(instance.normal_to_world(sample->normal));
+      if (const auto& material = sample->material) {
+        params.diffuse = material->diffuse;
+        params.specular = material->specular;
+        params.transmission = material->transmission;
+        params.roughness2 = std::pow(material->roughness, 4.0f);
+        interaction.emission = material->emission;
+      }
+    }
+  } else if (!view.face_sggx.empty()) {
+    params.sggx = to_world(unpack(view.face_sggx[face]), instance);
+    if (const auto narrow = narrow_normals(params.sggx, normal)) {
+      normal = narrow->normal;
+      params.roughness2 = std::min(params.roughness2 + narrow->roughness2, 1.0f);
+    } else {
+      is_flat = false;
+    }
+  }
+  interaction.shading_normal = visible_normal(normal, interaction.geometric_normal, interaction.wo);
+  if (is_flat) params.sggx = SymMat3::outer(interaction.shading_normal);
+  return params;
+}
+
+/// Light does not go through a surface because its two normals disagree about its sides.
+bool is_on_one_side(const Interaction& interaction, const vec3& wi) {
+  return glm::dot(wi, interaction.geometric_normal) * glm::dot(wi, interaction.shading_normal) >= 0.0f;
+}
+
+}  // namespace
+
 Interaction make_interaction(const TracedLevel& level, const InstanceRecord& instance, const RTCRayHit& ray_hit,
                              const HitRecord& hit) {
   const LevelView& view = level.view;
@@ -128,11 +218,13 @@ Interaction make_interaction(const TracedLevel& level, const InstanceRecord& ins
   interaction.instance = hit.instance;
   interaction.level = view.header.level;
   interaction.lambda = hit.lambda;
+  interaction.uv = glm::vec2(NAN);
 
   if (hit.is_volume) {
     interaction.kind = Interaction::Kind::Volume;
     const FlakeParams params = flake_params(view, instance, hit.element);
     interaction.albedo = params.diffuse + params.specular + params.transmission;
+    interaction.emission = emission_at(view.voxel_emission, hit.element);
     InteractionModel::put(interaction, InteractionModel(FlakePhase(params, interaction.wo)));
     return interaction;
   }
@@ -140,11 +232,10 @@ Interaction make_interaction(const TracedLevel& level, const InstanceRecord& ins
   const vec3 normal_local(hit.normal_local[0], hit.normal_local[1], hit.normal_local[2]);
   const vec3 normal = glm::normalize(instance.normal_to_world(glm::normalize(normal_local)));
   interaction.geometric_normal = glm::dot(normal, interaction.wo) < 0.0f ? -normal : normal;
-  const SurfaceParams params =
-      surface_params(view, instance, face_of(level, hit.element), interaction.geometric_normal);
+  const SurfaceParams params = shade_surface(level, instance, hit, direction, interaction);
   interaction.albedo = params.diffuse + params.specular + params.transmission;
   InteractionModel::put(interaction,
-                        InteractionModel(SurfaceBsdf(params, interaction.geometric_normal, interaction.wo),
+                        InteractionModel(SurfaceBsdf(params, interaction.shading_normal, interaction.wo),
                                          ray_offset(instance, origin, interaction.position, view.header.bounds)));
   return interaction;
 }
@@ -158,11 +249,14 @@ vec3 Interaction::ray_origin(const vec3& wi) const {
 ScatterSample Interaction::sample(Rng& rng) const {
   if (kind == Kind::None) return {};
   const InteractionModel& model = InteractionModel::of(*this);
-  return kind == Kind::Surface ? model.surface.sample(rng) : model.flakes.sample(rng);
+  if (kind == Kind::Volume) return model.flakes.sample(rng);
+  ScatterSample sample = model.surface.sample(rng);
+  if (!is_on_one_side(*this, sample.wi)) sample.weight = vec3(0.0f);
+  return sample;
 }
 
 glm::vec3 Interaction::eval(const glm::vec3& wi, Rng& rng) const {
-  if (kind == Kind::None) return vec3(0.0f);
+  if (kind == Kind::None || (kind == Kind::Surface && !is_on_one_side(*this, wi))) return vec3(0.0f);
   const InteractionModel& model = InteractionModel::of(*this);
   return kind == Kind::Surface ? model.surface.eval(wi, rng) : model.flakes.eval(wi, rng);
 }

@@ -22,6 +22,7 @@ LevelStore::LevelStore(std::unique_ptr<BvhDevice> device, const RuntimeOptions& 
     : budget_bytes_(options.budget_bytes),
       residency_(options.residency),
       messages_(messages),
+      textures_(messages),
       device_(std::move(device)),
       levels_(options.budget_bytes, [this](size_t item, const Error& error) { report_broken(item, error); }),
       loader_([this](size_t item) { levels_.acquire(item); }) {}
@@ -47,19 +48,19 @@ const TracedLevel* LevelStore::serve(uint32_t asset_index, uint32_t slot) {
   return nullptr;
 }
 
-Result<uint32_t> LevelStore::open(const std::filesystem::path& folder) {
+Result<uint32_t> LevelStore::open(const std::filesystem::path& folder, MaterialFunction materials) {
   for (uint32_t i = 0; i < assets_.size(); ++i) {
     if (assets_[i]->folder == folder) return i;
   }
   loader_.forget();  // its thread must not meet tables that grow, nor take the room of the root
-  FARFIELD_TRY_LET(auto asset, read_asset(folder));
+  FARFIELD_TRY_LET(auto asset, read_asset(folder, std::move(materials), textures_));
   if (auto root = load_root(*asset); !root) {
     refused_.push_back(std::move(asset));
     return tl::unexpected(root.error());
   }
   asset->traced.finest_slot = asset->traced.slot_count() - 1;  // until a plan says otherwise
   assets_.push_back(std::move(asset));
-  levels_.set_other_bytes(fixed_bytes());
+  levels_.set_other_bytes(fixed_bytes() + texture_bytes_);
   return static_cast<uint32_t>(assets_.size() - 1);
 }
 
@@ -80,7 +81,7 @@ Result<void> LevelStore::load_root(OpenAsset& asset) {
   FARFIELD_TRY_LET(const auto plan, plan_roots(asset));
   const size_t root = asset.items.back();
   const uint64_t needed = levels_.resident_bytes(root) + levels_.build_peak_bytes(root) + asset.table_bytes();
-  if (levels_.stats().accounted_bytes + needed > budget_bytes_) apply(plan);
+  if (levels_.stats().accounted_bytes + needed > budget_bytes_) apply(plan, 0);
 
   opening_ = &asset;
   opening_error_.reset();
@@ -114,7 +115,22 @@ PlanAsset LevelStore::plan_asset(const OpenAsset& asset) const {
   return wanted;
 }
 
-void LevelStore::apply(const Plan& plan) {
+uint64_t LevelStore::wanted_texture_bytes(const Plan& plan) const {
+  for (size_t i = 0; i < plan.finest.size(); ++i) {
+    const OpenAsset& asset = *assets_[i];
+    const bool shows_source = asset.levels[plan.finest[i]].level == 0;
+    if (shows_source && asset.close_up->has_textures()) return textures_.wanted_bytes(budget_bytes_);
+  }
+  return 0;
+}
+
+void LevelStore::report_no_room_for_textures(const Error& error) {
+  messages_.report_once(
+      said_no_room_, Severity::Warning,
+      fmt::format("close-ups have one colour per face, their textures do not fit: {}", error.message));
+}
+
+void LevelStore::apply(const Plan& plan, uint64_t texture_bytes) {
   loader_.forget();
   std::vector<size_t> dropped;
   for (size_t i = 0; i < plan.finest.size(); ++i) {
@@ -131,7 +147,9 @@ void LevelStore::apply(const Plan& plan) {
   const uint64_t before = levels_.stats().accounted_bytes;
   levels_.release(dropped);
   count_freed(before - levels_.stats().accounted_bytes);
-  levels_.set_other_bytes(fixed_bytes());
+  texture_bytes_ = texture_bytes;
+  textures_.set_bytes(texture_bytes);
+  levels_.set_other_bytes(fixed_bytes() + texture_bytes_);
 }
 
 void LevelStore::load(uint32_t asset, uint32_t slot) {

@@ -32,21 +32,26 @@ class LevelStore final : public LevelSource {
 
   // Between frames
   /// The asset in a (canonical) folder, opened with its root if it is not yet. Errors: those of Runtime::open_asset.
-  Result<uint32_t> open(const std::filesystem::path& folder);
+  Result<uint32_t> open(const std::filesystem::path& folder, MaterialFunction materials);
   size_t asset_count() const { return assets_.size(); }
   const OpenAsset& asset(uint32_t i) const { return *assets_[i]; }
 
   /// What all instances take, here and in the host's scene.
   void set_instance_bytes(uint64_t bytes) { instance_bytes_ = bytes; }
-  /// What the budget pays for besides levels.
+  /// What the budget pays for besides levels and textures.
   uint64_t fixed_bytes() const;
+
+  /// What the cache of textures wants if the plan shows textured sources up close; 0 if it does not.
+  uint64_t wanted_texture_bytes(const Plan& plan) const;
+  /// Says, once, that close-ups go without textures, and what would do.
+  void report_no_room_for_textures(const Error& error);
 
   /// Sizes and numbers of an asset's levels, as if it had no instance.
   PlanAsset plan_asset(uint32_t i) const { return plan_asset(*assets_[i]); }
   /// Ends what is being loaded ahead, so that sizes no longer change.
   void stop_loading() { loader_.forget(); }
-  /// Allows what the plan allows and gives back the rest.
-  void apply(const Plan& plan);
+  /// Allows what the plan allows and gives back the rest; the cache of textures gets this much.
+  void apply(const Plan& plan, uint64_t texture_bytes);
   /// Loads a level that the plan allows; in progressive mode only asks for it.
   void load(uint32_t asset, uint32_t slot);
 
@@ -68,6 +73,8 @@ class LevelStore final : public LevelSource {
   const uint64_t budget_bytes_;
   const Residency residency_;
   Messages& messages_;
+  TextureCache textures_;
+  uint64_t texture_bytes_ = 0;  ///< that the plan in force gives textures_
   uint64_t instance_bytes_ = 0;
   std::unique_ptr<BvhDevice> device_;
   std::vector<std::unique_ptr<OpenAsset>> assets_;
@@ -76,6 +83,7 @@ class LevelStore final : public LevelSource {
   std::optional<Error> opening_error_;  ///< why the root of the asset being opened did not load
   const OpenAsset* opening_ = nullptr;
   ResidentSet levels_;
+  std::atomic<bool> said_no_room_{false};
   std::atomic<uint64_t> fallbacks_{0};    ///< relaxed: a counter
   std::atomic<uint64_t> freed_bytes_{0};  ///< since the last malloc_trim; relaxed: a counter
   LoaderThread loader_;                   ///< last: stops before anything else goes

@@ -72,7 +72,8 @@ Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::
   FARFIELD_TRY_LET(loaded->file, LevelFile::open_known(path, asset.file_hashes[slot]));
   const LevelView& view = loaded->file->view();
   FARFIELD_TRY(check_header(view.header, asset, slot, path));
-  FARFIELD_TRY_LET(auto traced, TracedLevel::build(device, view, slot));
+  const SurfaceLook* look = view.header.level == 0 ? asset.close_up.get() : nullptr;
+  FARFIELD_TRY_LET(auto traced, TracedLevel::build(device, view, slot, look));
   loaded->traced = std::move(traced);
   loaded->file->release_build_pages();
   const LevelCost cost = level_cost(view, loaded->traced->scene);
@@ -84,10 +85,12 @@ Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::
 uint64_t OpenAsset::table_bytes() const {
   constexpr uint64_t kPerLevel = sizeof(LevelInfo) + 3 * sizeof(uint64_t) + sizeof(float) + sizeof(void*) +
                                  512;  // the ResidentSet's item and its function
-  return sizeof(OpenAsset) + traced.hull.capacity() * sizeof(vec3) + levels.size() * kPerLevel;
+  return sizeof(OpenAsset) + close_up->table_bytes() + traced.hull.capacity() * sizeof(vec3) +
+         levels.size() * kPerLevel;
 }
 
-Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folder) {
+Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folder, MaterialFunction materials,
+                                              TextureCache& textures) {
   FARFIELD_TRY_LET(const auto manifest, read_manifest(folder));
   if (manifest.levels.empty() || manifest.levels.size() > kLargestLevelCount) {
     return make_error(ErrorCode::Unsupported, fmt::format("{} has {} levels; from 1 to {} are possible",
@@ -114,6 +117,7 @@ Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folde
     asset->file_names.push_back(entry.file);
     asset->file_hashes.push_back(entry.file_hash);
   }
+  asset->close_up = std::make_unique<CloseUp>(folder, manifest, std::move(materials), textures);
   return asset;
 }
 

@@ -12,6 +12,7 @@
 #include "cache/level_file.h"
 #include "cache/residency.h"
 #include "farfield/runtime.h"
+#include "runtime/close_up.h"
 
 namespace farfield {
 
@@ -28,6 +29,7 @@ struct OpenAsset {
   dvec3 origin{0.0};             ///< of local space in the source's space
   Box3 bounds_source;            ///< in the source's space
   TracedAsset traced;
+  std::unique_ptr<CloseUp> close_up;  ///< of level 0
   std::vector<LevelInfo> levels;
   std::vector<uint64_t> build_peak_bytes;  ///< per level, from the manifest
   std::vector<std::string> file_names;     ///< per level, inside the folder
@@ -39,9 +41,10 @@ struct OpenAsset {
 };
 
 /// Reads and checks the manifest and sees that every level's file is there with the size it should have. Loads nothing.
-/// Errors: those of read_manifest; NotFound, BadFile (a level file, or sizes that cannot be), Unsupported (more than
-/// 256 levels).
-Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folder);
+/// Its textures are known to the cache from then on. Errors: those of read_manifest; NotFound, BadFile (a level file,
+/// or sizes that cannot be), Unsupported (more than 256 levels).
+Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folder, MaterialFunction materials,
+                                              TextureCache& textures);
 
 /// What loads level `slot` of `asset`: maps the file, checks all of it, builds the BVH and gives back what only that
 /// needed. Refers to the arguments.

@@ -84,7 +84,7 @@ Result<std::unique_ptr<Runtime>> Runtime::create(RTCDevice host_device, const Ru
   return runtime;
 }
 
-Result<AssetId> Runtime::open_asset(const std::string& folder) {
+Result<AssetId> Runtime::open_asset(const std::string& folder, MaterialFunction materials) {
   std::error_code error;
   const std::filesystem::path canonical = std::filesystem::canonical(folder, error);
   if (error) {
@@ -92,9 +92,16 @@ Result<AssetId> Runtime::open_asset(const std::string& folder) {
   }
   Impl& impl = *impl_;
   impl.count_instances();
-  FARFIELD_TRY_LET(const uint32_t asset, impl.levels.open(canonical));
+  FARFIELD_TRY_LET(const uint32_t asset, impl.levels.open(canonical, std::move(materials)));
   if (asset == impl.geometry.assets.size()) impl.geometry.assets.push_back(&impl.levels.asset(asset).traced);
   return AssetId{asset};
+}
+
+const std::string& Runtime::material_name(const Interaction& interaction) const {
+  static const std::string none;
+  const std::vector<InstanceRecord>& instances = impl_->geometry.instances;
+  if (interaction.instance >= instances.size()) return none;
+  return impl_->levels.asset(instances[interaction.instance].asset).close_up->material_name(interaction.material);
 }
 
 const std::vector<LevelInfo>& Runtime::levels(AssetId asset) const {

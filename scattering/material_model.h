@@ -25,22 +25,21 @@ struct MapMeans {
 };
 
 /// The means of a material whose maps are missing or not looked at.
-template <typename Map>
-MapMeans means_without_maps(const SurfaceMaterial<Map>& material) {
+inline MapMeans means_without_maps(const MaterialFactors& material, float vertex_alpha = 1) {
   MapMeans means;
   means.dielectric = vec3(1 - material.metallic);
   means.metal = vec3(material.metallic);
   means.metallic = material.metallic;
   means.roughness2 = std::pow(material.roughness, 4.0f);
-  if (material.alpha_mode == AlphaMode::Mask) means.opacity = material.alpha >= material.alpha_cutoff ? 1.0f : 0.0f;
-  if (material.alpha_mode == AlphaMode::Blend) means.opacity = std::clamp(material.alpha, 0.0f, 1.0f);
+  const float alpha = material.alpha * vertex_alpha;
+  if (material.alpha_mode == AlphaMode::Mask) means.opacity = alpha >= material.alpha_cutoff ? 1.0f : 0.0f;
+  if (material.alpha_mode == AlphaMode::Blend) means.opacity = std::clamp(alpha, 0.0f, 1.0f);
   return means;
 }
 
 /// `color`: the mean vertex colour, linear. What the specular lobe takes at normal incidence is left out of the diffuse
 /// one, so diffuse + transmission + specular <= 1 per channel.
-template <typename Map>
-MaterialSample material_sample(const SurfaceMaterial<Map>& material, const MapMeans& means, const vec3& color) {
+inline MaterialSample material_sample(const MaterialFactors& material, const MapMeans& means, const vec3& color) {
   const vec3 base = glm::clamp(material.base_color * color, vec3(0.0f), vec3(1.0f));
   MaterialSample out;
   out.specular = glm::clamp(material.dielectric_f0 * (1 - means.metallic) + base * means.metal, vec3(0.0f), vec3(1.0f));
@@ -64,6 +63,24 @@ MaterialSample material_sample(const SurfaceMaterial<Map>& material, const MapMe
     out.opacity *= pane;
   }
   return out;
+}
+
+/// What a host's function answered, within its ranges: albedos in [0, 1], NaN is 0, no negative light.
+inline MaterialSample in_range(MaterialSample sample) {
+  const auto clean = [](float x, float most) {
+    return x > 0 ? std::min(x, most) : 0.0f;
+  };  // NaN fails every comparison
+  const auto clean_color = [&](const vec3& c, float most) {
+    return vec3(clean(c.x, most), clean(c.y, most), clean(c.z, most));
+  };
+  sample.diffuse = clean_color(sample.diffuse, 1);
+  sample.specular = clean_color(sample.specular, 1);
+  sample.transmission = clean_color(sample.transmission, 1);
+  sample.roughness = clean(sample.roughness, 1);
+  sample.opacity = clean(sample.opacity, 1);
+  sample.emission = clean_color(sample.emission, 1e30f);
+  if (!is_finite(sample.normal)) sample.normal = {0, 0, 1};
+  return sample;
 }
 
 }  // namespace farfield

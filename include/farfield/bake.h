@@ -147,7 +147,8 @@ struct BakeInput {
   /// By material id. Without a material_function all ids that faces carry must be here; no materials at all: faces are
   /// grey.
   std::vector<BakeMaterial> materials;
-  /// The host's own materials: if set, `materials` say names and alpha modes only, and need not be complete.
+  /// The host's own materials: if set, `materials` give names only, and need not be complete. Called from many threads
+  /// at once. The same function goes to Runtime::open_asset(), unless the host shades level 0 by itself.
   MaterialFunction material_function;
   /// Stands for the answers of material_function: a bake of the same input under the same key is taken as the same.
   /// Empty: whether there is something to do cannot be told, so every call bakes.

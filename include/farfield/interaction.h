@@ -16,6 +16,9 @@ namespace detail {
 struct InteractionModel;
 }
 
+/// No such material or face, or not known.
+inline constexpr uint32_t kNoMaterial = 0xffffffffu;
+
 /// Where a ray met an instance and how light scatters there. A value that refers to the Runtime: use it before the next
 /// plan_frame(). All directions are unit vectors in world space that point away from the point. Safe from any thread.
 class FARFIELD_API Interaction {
@@ -30,11 +33,20 @@ class FARFIELD_API Interaction {
   glm::vec3 position{0.0f};          ///< world
   glm::vec3 wo{0.0f};                ///< where the ray came from
   glm::vec3 geometric_normal{0.0f};  ///< unit, on wo's side; zero in volumes
+  glm::vec3 shading_normal{0.0f};    ///< unit, what light sees: smooth, normal-mapped; on wo's side; zero in volumes
   float footprint = 0;               ///< world width of what the ray stands for here
   uint32_t instance = kNoInstance;   ///< InstanceId of the hit
   uint32_t level = 0;                ///< k of the level that was hit
   float lambda = 0;                  ///< continuous level that the ray asked for
   glm::vec3 albedo{0.0f};            ///< diffuse + specular + transmission, for AOVs and denoisers
+  glm::vec3 emission{0.0f};          ///< radiance that leaves the point along wo by itself
+
+  // For a host that shades level 0 with its own materials; at coarser levels unknown: prefiltered faces have none.
+  uint32_t material = kNoMaterial;     ///< id of the source's material; its name: Runtime::material_name()
+  uint32_t source_face = kNoMaterial;  ///< number of the source's face; kNoMaterial where the level does not keep it
+  glm::vec2 barycentric{0.0f};  ///< weights of the second and third corner of the source's triangle; of a part of
+                                ///< a polygon where the source's face is no triangle
+  glm::vec2 uv{0.0f};           ///< texture coordinates, v points down the image; NaN where there are none
 
   /// Origin for a ray that leaves in direction wi: offset to wi's side of a surface, the point itself in a volume. The
   /// offset is a few roundings of all coordinates that went into the hit (1e-6 of them), so that the ray, with tnear 0,
@@ -42,8 +54,9 @@ class FARFIELD_API Interaction {
   glm::vec3 ray_origin(const glm::vec3& wi) const;
   /// Draws wi. The number of values taken from rng varies.
   ScatterSample sample(Rng& rng) const;
-  /// Surfaces: BRDF (and transmission) times |cos|; volumes: albedo times phase function. Linear RGB per steradian.
-  /// For diffuse microfacets an unbiased one-sample estimate: rng supplies the sample.
+  /// Surfaces: BRDF (and transmission) times |cos| to the shading normal, 0 for directions that are not on the same
+  /// side of both normals; volumes: albedo times phase function. Linear RGB per steradian. For diffuse microfacets an
+  /// unbiased one-sample estimate: rng supplies the sample.
   glm::vec3 eval(const glm::vec3& wi, Rng& rng) const;
   /// For multiple importance sampling, per steradian. Surfaces: the density with which sample() draws wi. Volumes: a
   /// normalised density close to that, which has no closed form; estimates stay unbiased with ScatterSample::weight.

@@ -19,6 +19,7 @@ struct HitRecord {
   float lambda = 0;                   ///< continuous level that was asked for
   float footprint = 0;                ///< world width of what the ray stands for there
   float normal_local[3] = {0, 0, 0};  ///< geometric normal, instance space, unnormalised; surfaces only
+  float barycentric[2] = {0, 0};      ///< weights of the face's second and third corner; surfaces only
 };
 
 /// The context to pass to rtcIntersect1 and rtcOccluded1 for rays that may meet Farfield geometry:

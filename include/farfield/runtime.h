@@ -31,6 +31,7 @@
 #include "farfield/embree.h"
 #include "farfield/export.h"
 #include "farfield/interaction.h"
+#include "farfield/material.h"
 #include "farfield/ray.h"
 #include "farfield/result.h"
 
@@ -108,7 +109,12 @@ class FARFIELD_API Runtime {
 
   /// Opens a baked asset: reads its manifest and checks it, loads its root. Opening the same folder again gives the
   /// same id. Errors: NotFound, Io, BadFile, Unsupported, OutOfBudget (the message has the number that would do).
-  Result<AssetId> open_asset(const std::string& folder);
+  /// `materials`: the host's own for level 0 (farfield/material.h), in place of those that the bake has kept; it is
+  /// called by rays from any thread, and must answer as it did in the bake for levels to match. Only the first opening
+  /// of a folder counts.
+  Result<AssetId> open_asset(const std::string& folder, MaterialFunction materials = {});
+  /// The name that the source gives a material of the instance's asset; empty for one that there is not.
+  const std::string& material_name(const Interaction& interaction) const;
   /// The asset's stored levels, finest first; none for an id that open_asset() did not give.
   const std::vector<LevelInfo>& levels(AssetId asset) const;
   /// Corners of the box that contains all levels, in the space of the source. For an id that open_asset() did not give

@@ -125,6 +125,8 @@ TEST(Usage, NonsenseIsOneLineThatPointsToTheHelp) {
       {"render", "a.glb", "-o", "b.exr", "--lod-scale", "nan"},
       {"render", "a.glb", "-o", "b.exr", "--frame", "-1"},
       {"render", "a.glb", "-o", "b.exr", "--spp", "0"},
+      {"render", "a.glb", "-o", "b.exr", "--fps", "0"},
+      {"render", "a.glb", "-o", "b.exr", "--no-sky", "--environment", "c.exr"},
       {"shot", "a.glb", "-o", "b"},
       {"shot", "a.glb", "-o", "b", "--frames", "9-1"},
       {"shot", "a.glb", "-o", "b", "--frames", "0-9:0"},

@@ -224,6 +224,20 @@ LevelData full_level() {
   return level;
 }
 
+LevelData full_level_of_version_2() {
+  LevelData level = full_level();
+  level.face_opacity = counted<uint8_t>(3, 12);
+  level.face_emission = counted<PackedRadiance>(3, 13);
+  level.voxel_emission = counted<PackedRadiance>(5, 14);
+  level.face_material = {0, 7, 2};
+  level.source_face = {5 << kSourceTurnBits | 1, 0, 9 << kSourceTurnBits | 2};
+  level.corner_vertex = {{0, 1, 2}, {2, 1, 0}, {1, 1, 1}};
+  level.shading_normal = counted<PackedNormal>(3, 15);
+  level.shading_uv = {{0.0f, 1.0f}, {-2.5f, 0.25f}, {1e6f, NAN}};  // sources say that, too
+  level.shading_color = counted<PackedVertexColor>(3, 16);
+  return level;
+}
+
 LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks) {
   Rng rng(seed);
   LevelData level;

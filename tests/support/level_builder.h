@@ -51,8 +51,11 @@ LevelData sphere_level(const vec3& center, float radius, uint32_t rings, uint32_
 /// (there is no 4) dense voxels. `rings` sets the size of level 0.
 std::vector<LevelData> white_sphere(uint32_t rings = 64);
 
-/// A level with every section: two quads (a pair and a lone triangle) and two bricks of a 2x1x1 table.
+/// A level with every section of the format's first version: two quads (a pair and a lone triangle) and two bricks of a
+/// 2x1x1 table.
 LevelData full_level();
+/// The same with those of the second version too.
+LevelData full_level_of_version_2();
 
 /// A random sound level: `quads` quads, `bricks` bricks, channels picked by the seed.
 LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks);

@@ -17,6 +17,7 @@
 #include "cache/level_file.h"
 #include "tests/support/files.h"
 #include "tests/support/random_unit.h"
+#include "tests/support/source_surfaces.h"
 #include "tests/support/surfaces.h"
 
 namespace farfield {
@@ -55,11 +56,9 @@ BakeOptions small_options() {
 
 /// A ball of 2 * 32 * 16 triangles inside a cloud of leaves: surface at fine levels, leaves that become volume.
 ImportedAsset ball_in_leaves() {
-  ImportedAsset asset;
   test::LeafCloud cloud;
   cloud.count = 1500;
-  asset.surface = test::leaf_cloud(cloud);
-  Surface& surface = asset.surface;
+  Surface surface = test::leaf_cloud(cloud);
   constexpr uint32_t kAround = 32, kUp = 16;
   const auto first = static_cast<uint32_t>(surface.positions.size());
   const auto point = [](float theta, float phi) {
@@ -90,19 +89,18 @@ ImportedAsset ball_in_leaves() {
     }
     add(at(kUp - 1, j), last, at(kUp - 1, j + 1));
   }
-  asset.source_hash = 77;
-  return asset;
+  return test::asset_of(surface, 77);
 }
 
-ImportedAsset two_triangles() {
-  ImportedAsset asset;
-  asset.surface.positions = {vec3(0), vec3(4, 0, 0), vec3(4, 4, 0), vec3(0, 4, 0)};
-  asset.surface.triangles = {uvec3(0, 1, 2), uvec3(0, 2, 3)};
+ImportedAsset two_triangles(float grey = 0.5f) {
+  Surface surface;
+  surface.positions = {vec3(0), vec3(4, 0, 0), vec3(4, 4, 0), vec3(0, 4, 0)};
+  surface.triangles = {uvec3(0, 1, 2), uvec3(0, 2, 3)};
   FaceMaterial material;
   material.sggx = SymMat3::outer(vec3(0, 0, 1));
-  material.diffuse = vec3(0.5f);
-  asset.surface.materials.assign(2, material);
-  return asset;
+  material.diffuse = vec3(grey);
+  surface.materials.assign(2, material);
+  return test::asset_of(surface);
 }
 
 /// Every file below a folder, by relative name.
@@ -386,9 +384,7 @@ TEST_F(Bake, SaysItsWarningsAgainWhenUpToDateAndTheyDoNotNameTheFolder) {
 TEST_F(Bake, BakesAnewWhenAFileIsOfAnotherBake) {
   ASSERT_TRUE(bake(two_triangles(), "thing", out(), small_options()).has_value());
   const auto before = files_of(out());
-  ImportedAsset darker = two_triangles();
-  for (FaceMaterial& material : darker.surface.materials) material.diffuse = vec3(0.1f);
-  ASSERT_TRUE(bake(std::move(darker), "thing", folder_ / "darker", small_options()).has_value());
+  ASSERT_TRUE(bake(two_triangles(0.1f), "thing", folder_ / "darker", small_options()).has_value());
   fs::copy_file(folder_ / "darker" / "level_0.ffl", out() / "level_0.ffl", fs::copy_options::overwrite_existing);
   ASSERT_EQ(fs::file_size(out() / "level_0.ffl"), before.at("level_0.ffl").size());
 
@@ -453,11 +449,9 @@ TEST_F(Bake, DoesNotVoxeliseWhatCannotSaveAnything) {
   options.measure_resident = [](const LevelView& level) {
     return Result<LevelCost>(LevelCost{level.header.level == 0 ? 100000u : 1000u >> level.header.level, 1});
   };
-  ImportedAsset specks;  // all smaller than a voxel, in most of some 5000 bricks
-  test::LeafCloud cloud;
-  cloud.leaf_size = 0.006f;
-  specks.surface = test::leaf_cloud(cloud);
-  const auto report = bake(std::move(specks), "specks", out(), options);
+  test::LeafCloud specks;  // all smaller than a voxel, in most of some 5000 bricks
+  specks.leaf_size = 0.006f;
+  const auto report = bake(test::asset_of(test::leaf_cloud(specks)), "specks", out(), options);
   ASSERT_TRUE(report.has_value());
   EXPECT_EQ(report->levels[1].voxelized_triangles, 8000u);
   EXPECT_TRUE(report->levels[1].worthless);
@@ -465,6 +459,41 @@ TEST_F(Bake, DoesNotVoxeliseWhatCannotSaveAnything) {
   EXPECT_FALSE(report->levels.back().worthless);
   EXPECT_TRUE(report->levels.back().is_written);
   open_levels(out());
+}
+
+/// A square with a texture of `side`^2 texels that varies everywhere.
+ImportedAsset textured_square(int side) {
+  std::vector<vec4> texels;
+  for (int i = 0; i < side * side; ++i) texels.emplace_back(vec3(static_cast<float>(mix64(i) % 1000) / 1000), 1);
+  SourceMesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  mesh.corner_position = {0, 1, 2, 3};
+  mesh.face_begin = {0, 4};
+  mesh.corner_uv = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  mesh.face_material = {0};
+  mesh.materials.resize(1);
+  mesh.materials[0].name = "noise";
+  mesh.materials[0].base_color_map.image = std::make_shared<const Texture>(side, side, texels);
+  return std::move(*condition(std::move(mesh), "square"));
+}
+
+TEST_F(Bake, KeepsTexturesAndStoresNoLevelThatTakesMoreThanThey) {
+  const auto report = bake(textured_square(64), "square", out(), small_options());
+  ASSERT_TRUE(report.has_value()) << report.error().message;
+  ASSERT_EQ(report->manifest.textures.size(), 1u);
+  EXPECT_EQ(report->manifest.materials.at(0).name, "noise");
+  EXPECT_EQ(report->manifest.materials[0].base_color_map.texture, 0u);
+  EXPECT_TRUE(fs::exists(out() / "texture_0.tif"));
+  uint64_t least = report->manifest.levels[0].resident_bytes + report->manifest.textures[0].cache_bytes;
+  for (size_t i = 1; i < report->manifest.levels.size(); ++i) {
+    EXPECT_LT(report->manifest.levels[i].resident_bytes, least);
+    least = report->manifest.levels[i].resident_bytes;
+  }
+  EXPECT_TRUE(bake(textured_square(64), "square", out(), small_options())->up_to_date);
+  const auto before = files_of(out());
+  std::ofstream(out() / "texture_0.tif", std::ios::app) << "x";
+  EXPECT_FALSE(bake(textured_square(64), "square", out(), small_options())->up_to_date);
+  EXPECT_EQ(files_of(out()), before);
 }
 
 TEST_F(Bake, RefusesSenselessOptions) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cache/level_file.h"
+#include "cache/level_check.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -118,18 +119,40 @@ TEST(LevelFile, ReleasedBuildPagesComeBackUnchanged) {
 
 // ---- the format ----
 
-TEST(LevelFormat, GoldenBytesOfVersion1AreFrozen) {
-  // Made by this test's first version. If it fails, the format has changed: give it a new version, keep reading this
-  // one.
-  const std::vector<std::byte> golden = test::read_bytes(FARFIELD_TEST_DATA "/format_v1/level_3.ffl");
-  ASSERT_EQ(golden.size(), 3264u);
-  FileImage written(view_of(full_level()));
+/// Made by this test's first version. If it fails, the format has changed: give it a new version, keep reading this
+/// one.
+void expect_frozen(const char* file, size_t bytes, const LevelData& level) {
+  const std::vector<std::byte> golden = test::read_bytes(std::string(FARFIELD_TEST_DATA) + file);
+  ASSERT_EQ(golden.size(), bytes);
+  FileImage written(view_of(level));
   EXPECT_TRUE(std::ranges::equal(golden, written.bytes()));
 
   FileImage image(golden);
   const Result<LevelView> view = parse_level(image.bytes(), LevelCheck::Full, "golden");
   ASSERT_TRUE(view) << view.error().message;
-  expect_same(*view, view_of(full_level()));
+  expect_same(*view, view_of(level));
+}
+
+TEST(LevelFormat, GoldenBytesOfVersion1AreFrozen) { expect_frozen("/format_v1/level_3.ffl", 3264u, full_level()); }
+
+TEST(LevelFormat, GoldenBytesOfVersion2AreFrozen) {
+  expect_frozen("/format_v2/level_3.ffl", 4160u, test::full_level_of_version_2());
+}
+
+TEST(LevelFile, CornersMustReferToShadingVertices) {
+  const auto problem = [](const std::function<void(LevelData&)>& spoil) {
+    LevelData level = test::full_level_of_version_2();
+    spoil(level);
+    return find_structure_problem(view_of(level)).value_or("");
+  };
+  EXPECT_EQ(problem([](LevelData&) {}), "");
+  EXPECT_EQ(problem([](LevelData& l) { l.corner_vertex[1].z = 3; }),
+            "corner_vertex[1] = (2, 1, 3), and there are 3 shading vertices");
+  EXPECT_EQ(problem([](LevelData& l) { l.corner_vertex.clear(); }),
+            "corner_vertex and shading vertices do not go together");
+  EXPECT_EQ(problem([](LevelData& l) { l.shading_uv.pop_back(); }), "shading_uv has 2 elements for 3 shading vertices");
+  EXPECT_EQ(problem([](LevelData& l) { l.face_opacity.pop_back(); }), "face_opacity has 2 elements for 3 faces");
+  EXPECT_EQ(problem([](LevelData& l) { l.voxel_emission.pop_back(); }), "voxel_emission has 4 elements for 5 voxels");
 }
 
 TEST(LevelFormat, EverySectionStartsAtTheNextCacheLine) {
@@ -245,7 +268,7 @@ TEST(HostileLevelFile, HeaderAndTableFieldsAreChecked) {
   const std::vector<Case> cases = {
       {"does not start as a level file", [](auto& h, auto*) { h.magic[1] = 'X'; }},
       {"the format version is 0", [](auto& h, auto*) { h.version = 0; }},
-      {"level format 2, and this Farfield reads up to 1", [](auto& h, auto*) { h.version = 2; },
+      {"level format 3, and this Farfield reads up to 2", [](auto& h, auto*) { h.version = 3; },
        ErrorCode::Unsupported},
       {"the header says", [](auto& h, auto*) { h.file_bytes = kHuge; }},
       {"sections leaves the file", [](auto& h, auto*) { h.section_count = 0xffffffffu; }},

@@ -77,6 +77,61 @@ TEST(Manifest, GoldenTextOfVersion1IsFrozen) {
             std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
 }
 
+Manifest textured_manifest() {
+  Manifest manifest = sample_manifest();
+  manifest.textures.push_back({"texture_0.tif", 1234, 99, 1024, 512, 3, 9000});
+  manifest.textures.push_back({"texture_1.tif", 5, 98, 16, 16, 2, 300});
+  AssetMaterial& bark = manifest.materials.emplace_back();
+  bark.name = "bark \"old\"";
+  bark.base_color = {0.1f, 0.2f, 0.3f};
+  bark.emission = {40, 0, 0.25f};
+  bark.normal_scale = -2;
+  bark.alpha_mode = AlphaMode::Mask;
+  bark.alpha_cutoff = 0.75f;
+  bark.base_color_map = {0, Wrap::Mirror, Wrap::Clamp};
+  bark.mask_map = {1, Wrap::Repeat, Wrap::Mirror};
+  manifest.materials.emplace_back().thin_transmission = 0.5f;
+  return manifest;
+}
+
+TEST(Manifest, MaterialsAndTexturesComeBack) {
+  const Manifest manifest = textured_manifest();
+  const Result<Manifest> read = manifest_from_json(manifest_to_json(manifest), "test");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(manifest_to_json(*read), manifest_to_json(manifest));
+  ASSERT_EQ(read->materials.size(), 2u);
+  const AssetMaterial& bark = read->materials[0];
+  EXPECT_EQ(bark.name, "bark \"old\"");
+  EXPECT_EQ(bark.emission, vec3(40, 0, 0.25f));
+  EXPECT_EQ(bark.alpha_mode, AlphaMode::Mask);
+  EXPECT_EQ(bark.base_color_map.texture, 0u);
+  EXPECT_EQ(bark.base_color_map.wrap_u, Wrap::Mirror);
+  EXPECT_EQ(bark.mask_map.texture, 1u);
+  EXPECT_FALSE(bark.normal_map);
+  EXPECT_EQ(read->materials[1].thin_transmission, 0.5f);
+  EXPECT_EQ(read->textures[0].height, 512u);
+  EXPECT_EQ(read->textures[1].cache_bytes, 300u);
+}
+
+TEST(HostileManifest, MaterialsAndTexturesAreChecked) {
+  const auto message = [](const std::function<void(Manifest&)>& spoil) {
+    Manifest manifest = textured_manifest();
+    spoil(manifest);
+    const auto read = manifest_from_json(manifest_to_json(manifest), "test");
+    return read ? std::string("accepted") : read.error().message;
+  };
+  EXPECT_EQ(message([](Manifest&) {}), "accepted");
+  const auto expect = [&](const char* words, const std::function<void(Manifest&)>& spoil) {
+    EXPECT_NE(message(spoil).find(words), std::string::npos) << message(spoil);
+  };
+  expect("texture 2, and there are 2", [](Manifest& m) { m.materials[0].normal_map.texture = 2; });
+  expect("not a file name inside", [](Manifest& m) { m.textures[0].file = "../passwd"; });
+  expect("serves two textures", [](Manifest& m) { m.textures[0].file = m.textures[1].file; });
+  expect("out of range", [](Manifest& m) { m.textures[0].channels = 5; });
+  expect("out of range", [](Manifest& m) { m.textures[0].width = 0; });
+  expect("out of range", [](Manifest& m) { m.textures[1].cache_bytes = ~uint64_t{0}; });
+}
+
 TEST(Manifest, FieldsThatThisVersionDoesNotKnowAreIgnored) {
   Json json = Json::parse(manifest_to_json(sample_manifest()));
   json["note"] = {{"by", "someone"}};
@@ -191,7 +246,7 @@ std::string with(const std::string& pointer, const std::string& value) {
 }
 
 TEST(HostileManifest, VersionsAreCheckedFirst) {
-  expect_message(with("/version", "2"), "format version 2, and this Farfield reads up to 1", ErrorCode::Unsupported);
+  expect_message(with("/version", "3"), "format version 3, and this Farfield reads up to 2", ErrorCode::Unsupported);
   expect_message(R"({"version": 18446744073709551615})", "use a newer Farfield", ErrorCode::Unsupported);
   expect_message(with("/version", "0"), "the format version is 0");
   for (const char* value : {"-1", "1.0", "\"1\"", "null", "[]", "1e3"}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "import/texture_module.h"
+#include "base/texture_module.h"
 
 #include <gtest/gtest.h>
 #include <stdlib.h>

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "path_tracer/preetham_sky.h"
 #include "tests/support/files.h"
 #include "tests/support/statistics.h"
@@ -31,6 +33,9 @@ std::vector<NamedEnvironment> sample_environments() {
     options.sun_angle_rad = 0.2f;  // wide enough for the chi-square test's cells and for quadrature
     all.push_back({"sun and sky at height " + std::to_string(height), Environment::sun_sky(options)});
   }
+  const DistantLight lights[] = {{{0, 1, 0}, {1, 2, 3}, 0.2f}, {{0.6f, 0, 0.8f}, {3, 2, 1}, 0.4f}};
+  all.push_back({"two lights and an image", Environment::from_image(gradient_image())->with(lights)});
+  all.push_back({"two lights and nothing else", Environment::constant(vec3(0.0f)).with(lights)});
   return all;
 }
 
@@ -190,13 +195,53 @@ TEST(Environment, ReadsLatLongExrFiles) {
   Image image(4, 2, {"R", "G", "B"});
   image.pixel(3, 0)[1] = 5.0f;  // upper half, from +x to behind
   ASSERT_TRUE(write_exr(folder.path() / "light.exr", image));
-  const auto environment = Environment::from_exr(folder.path() / "light.exr", 2.0f);
+  const auto environment = Environment::from_file(folder.path() / "light.exr", 2.0f);
   ASSERT_TRUE(environment);
   EXPECT_EQ(environment->radiance(glm::normalize(vec3(1, 1, 1))), vec3(0, 10, 0));
   EXPECT_EQ(environment->radiance(glm::normalize(vec3(1, 1, -1))), vec3(0.0f));
-  const auto missing = Environment::from_exr(folder.path() / "none.exr");
+  const auto missing = Environment::from_file(folder.path() / "none.exr");
   EXPECT_EQ(missing.error().code, ErrorCode::NotFound);
   EXPECT_NE(missing.error().message.find("none.exr"), std::string::npos);
+}
+
+// A picture in Radiance's format without run lengths: a row of width pixels of three mantissas and an exponent.
+std::string hdr_file(const std::vector<std::array<uint8_t, 4>>& pixels) {
+  std::string file = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X " + std::to_string(pixels.size()) + "\n";
+  for (const auto& pixel : pixels) file.append(reinterpret_cast<const char*>(pixel.data()), 4);
+  return file;
+}
+
+TEST(Environment, ReadsRadianceHdrFiles) {
+  const test::TemporaryFolder folder;
+  const auto path = folder.path() / "light.hdr";
+  test::write_text(path, hdr_file({{128, 64, 0, 130}, {128, 128, 128, 129}}));  // mantissa / 256 * 2^(exponent - 128)
+  const auto environment = Environment::from_file(path);
+  ASSERT_TRUE(environment) << environment.error().message;
+  const vec3 left = environment->radiance({-1, 0, 0}), right = environment->radiance({1, 0, 0});
+  EXPECT_LT(glm::length(left - vec3(2, 1, 0)), 0.02f);
+  EXPECT_LT(glm::length(right - vec3(1, 1, 1)), 0.02f);
+
+  EXPECT_EQ(Environment::from_file(folder.path() / "none.hdr").error().code, ErrorCode::NotFound);
+  for (const std::string& bad : {std::string("#?RADIANCE\n"), std::string(), std::string("P6 1 1 255 abc")}) {
+    test::write_text(path, bad);
+    const auto refused = Environment::from_file(path);
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().message.find("light.hdr"), std::string::npos) << refused.error().message;
+  }
+}
+
+TEST(Environment, SkyAndGroundMeetWithoutAnEdge) {
+  const Environment environment = Environment::sun_sky(default_sun_sky());
+  for (int i = 0; i < 16; ++i) {
+    const float azimuth = 2 * kPi * (static_cast<float>(i) + 0.5f) / 16;
+    const auto at = [&](float degrees) {
+      const float height = degrees * kPi / 180;
+      return environment.radiance(
+          {std::cos(height) * std::sin(azimuth), std::sin(height), -std::cos(height) * std::cos(azimuth)});
+    };
+    for (float degrees = -5; degrees < 5; degrees += 0.05f)
+      EXPECT_LT(glm::length(at(degrees + 0.05f) - at(degrees)), 0.03f * glm::length(at(degrees))) << degrees;
+  }
 }
 
 TEST(PreethamSky, IsBlueOverheadAndBrighterTowardsTheSun) {

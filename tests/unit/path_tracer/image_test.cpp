@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "base/random.h"
-#include "import/texture_module.h"
+#include "base/texture_module.h"
 #include "tests/support/file_size_limit.h"
 #include "tests/support/files.h"
 

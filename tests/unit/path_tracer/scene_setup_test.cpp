@@ -86,19 +86,45 @@ TEST(MakeCamera, WithoutACameraTheWholeSceneIsSeen) {
   EXPECT_GT(make_camera(GltfScene(), 0, 0, 10, 10).tessellation().pixel_spread, 0.0f);  // nothing to see: no crash
 }
 
-TEST(MakeLights, BrightestDirectionalLightIsTheSun) {
+TEST(MakeLights, BrightestDirectionalLightIsTheSunAndTheOthersShineBesideIt) {
   GltfScene scene;
   const vec3 travels = glm::normalize(vec3(-1, -2, 0.5f));
-  scene.lights = {directional({0, -1, 0}, 100), directional(travels, 3073.5f)};
+  scene.lights = {directional({0, -1, 0}, 683), directional(travels, 3073.5f)};
   scene.lights[1].color = vec3(1.0f, 0.8f, 0.6f);
   std::vector<std::string> warnings;
   const auto lights = make_lights(scene, RenderOptions(), warnings);
   ASSERT_TRUE(lights);
-  EXPECT_EQ(warnings.size(), 1u);
+  EXPECT_TRUE(warnings.empty());
   const vec3 sun = lights->environment.radiance(-travels),
              beside = lights->environment.radiance(glm::normalize(-travels + vec3(0.02f, 0, 0)));
   EXPECT_GT(luminance(sun), 1000 * luminance(beside));
   EXPECT_NEAR(sun.z / sun.x, 0.6f, 0.01f);
+  const vec3 second = lights->environment.radiance({0, 1, 0});
+  EXPECT_NEAR(second.x * kPi * 0.00465f * 0.00465f, 1.0f, 0.01f);  // 683 lux are 1 W / m^2
+}
+
+TEST(MakeLights, WithoutSkyOnlyTheScenesOwnLightsShine) {
+  GltfScene scene;
+  scene.lights = {directional({0, -1, 0}, 683), directional({-1, 0, 0}, 1366)};
+  RenderOptions options;
+  options.sky = false;
+  std::vector<std::string> warnings;
+  const auto lights = make_lights(scene, options, warnings);
+  ASSERT_TRUE(lights);
+  EXPECT_TRUE(warnings.empty());
+  Rng rng(3);
+  for (int i = 0; i < 1000; ++i) {
+    const EnvironmentSample sample = lights->environment.sample(rng);
+    ASSERT_TRUE(sample.wi.y > 0.9999f || sample.wi.x > 0.9999f);
+  }
+  EXPECT_EQ(lights->environment.radiance({0, 0, 1}), vec3(0.0f));
+  EXPECT_EQ(lights->environment.radiance({0, -1, 0}), vec3(0.0f));
+
+  const auto nothing = make_lights(GltfScene(), options, warnings);
+  ASSERT_TRUE(nothing);
+  EXPECT_EQ(nothing->environment.sample(rng).pdf, 0.0f);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("--no-sky"), std::string::npos);
 }
 
 TEST(MakeLights, SunKeepsItsStrengthInWattsPerSquareMetre) {

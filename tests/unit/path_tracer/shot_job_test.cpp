@@ -4,10 +4,12 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "path_tracer/film.h"
 #include "path_tracer/image.h"
 #include "tests/support/files.h"
 #include "tests/support/level_builder.h"
@@ -35,6 +37,12 @@ TEST(ParseFrameRange, RefusesTheRest) {
     ASSERT_FALSE(range) << text;
     EXPECT_EQ(range.error().code, ErrorCode::InvalidArgument);
   }
+}
+
+float value(const Image& image, int x, int y, const char* channel) {
+  const int index = image.find_channel(channel);
+  EXPECT_GE(index, 0) << channel;
+  return index < 0 ? -1.0f : image.pixel(x, y)[index];
 }
 
 // A scene of two spheres that the camera flies away from, and a script for a baker that copies a prepared asset.
@@ -110,7 +118,7 @@ TEST_F(Shot, WritesFramesRecordAndSheet) {
   ASSERT_TRUE(first && last);
   EXPECT_EQ(std::get<int>(last->metadata.at("farfield.frame")), 24);
   EXPECT_EQ(std::get<vec3>(last->metadata.at("camera.position")), vec3(0, 0, 200));
-  EXPECT_EQ(first->image.channel_count(), 8u);
+  EXPECT_EQ(first->image.channel_count(), 15u);
   const auto alpha = [](const Image& image) { return image.pixel(24, 16)[3]; };
   EXPECT_EQ(alpha(first->image), 1.0f);
   EXPECT_LT(alpha(last->image), 1.0f);
@@ -193,6 +201,65 @@ TEST_F(Shot, FrameDoesNotDependOnTheFramesBefore) {
   EXPECT_EQ(test::read_bytes(folder_.path() / "alone.exr"), test::read_bytes(out() / "frame_0024.exr"));
 }
 
+TEST_F(Shot, FramesPerSecondSayWhatTimeAFrameShows) {
+  const auto camera_of = [&](int frame) {
+    EXPECT_TRUE(render_frame(options_, frame, folder_.path() / "frame.exr"));
+    return std::get<vec3>(read_exr(folder_.path() / "frame.exr")->metadata.at("camera.position"));
+  };
+  EXPECT_EQ(camera_of(12), vec3(0, 0, 102));  // half a second at the default of 24
+  options_.frames_per_second = 48;
+  EXPECT_EQ(camera_of(24), vec3(0, 0, 102));
+  options_.frames_per_second = 6;
+  EXPECT_EQ(camera_of(3), vec3(0, 0, 102));
+}
+
+// The camera looks from z = 4 at a ball of radius 1 around the origin; another one stands to its left.
+TEST_F(Shot, FramesSayWhatTheCameraSees) {
+  options_.full_detail = true;
+  options_.cryptomatte = true;
+  ASSERT_TRUE(render_frame(options_, 0, folder_.path() / "frame.exr"));
+  const auto file = read_exr(folder_.path() / "frame.exr");
+  ASSERT_TRUE(file) << file.error().message;
+  const Image& image = file->image;
+  EXPECT_EQ(image.channel_count(), 15u + 2 * kCryptomatteRanks);
+  const auto at = [&](int x, int y, const char* channel) { return value(image, x, y, channel); };
+
+  EXPECT_NEAR(at(24, 16, "Z"), 3.0f, 0.02f);  // along the axis, not the ray
+  EXPECT_NEAR(at(24, 16, "N.Z"), 1.0f, 0.02f);
+  EXPECT_NEAR(at(24, 16, "albedo.G"), 1.0f, 0.01f);  // a white sphere
+  EXPECT_GT(at(30, 16, "N.X"), 0.3f);
+  EXPECT_GT(at(24, 10, "N.Y"), 0.3f);  // y of the image runs down, that of the world up
+  EXPECT_EQ(at(47, 0, "Z"), kNoDepth);
+  EXPECT_EQ(at(47, 0, "albedo.R"), 0.0f);
+  EXPECT_EQ(at(47, 0, "N.Z"), 0.0f);
+
+  const auto id = [](const char* name) { return std::bit_cast<float>(cryptomatte_id(name)); };
+  EXPECT_EQ(at(24, 16, "CryptoObject00.R"), id("node 0"));
+  EXPECT_EQ(at(24, 16, "CryptoObject00.G"), 1.0f);
+  EXPECT_EQ(at(24, 16, "CryptoObject00.B"), 0.0f);
+  EXPECT_EQ(at(47, 0, "CryptoObject00.G"), 0.0f);
+  bool sees_second = false;
+  for (int x = 0; x < 24; ++x) sees_second |= at(x, 16, "CryptoObject00.R") == id("node 1");
+  EXPECT_TRUE(sees_second);
+  for (int y = 0; y < 32; ++y)
+    for (int x = 0; x < 48; ++x)  // nothing is transparent: all that covers a pixel has a name
+      EXPECT_NEAR(at(x, y, "A"), at(x, y, "CryptoObject00.G") + at(x, y, "CryptoObject00.A"), 1e-6f);
+
+  const Metadata expected = cryptomatte_metadata("CryptoObject", {"node 0", "node 1"});
+  for (const auto& [key, text] : expected) EXPECT_EQ(file->metadata.at(key), text) << key;
+}
+
+TEST_F(Shot, WithoutSkyItIsDark) {
+  options_.sky = false;
+  std::vector<std::string> warnings;
+  options_.warning = [&](const std::string& line) { warnings.push_back(line); };
+  ASSERT_TRUE(render_frame(options_, 0, folder_.path() / "dark.exr"));
+  ASSERT_EQ(warnings.size(), 1u);
+  const auto file = read_exr(folder_.path() / "dark.exr");
+  for (int x = 0; x < 48; ++x)
+    for (int c = 0; c < 3; ++c) EXPECT_EQ(file->image.pixel(x, 16)[c], 0.0f);
+}
+
 TEST_F(Shot, CancelKeepsFinishedFramesAndTheRecord) {
   std::atomic<bool> cancel{false};
   options_.job.cancel = &cancel;
@@ -220,7 +287,7 @@ TEST_F(Shot, FullDetailShowsLevelZeroOnly) {
   ASSERT_TRUE(render_frame(options_, 24, folder_.path() / "full.exr"));
   const auto file = read_exr(folder_.path() / "full.exr");
   for (int y = 0; y < 32; ++y)
-    for (int x = 0; x < 48; ++x) EXPECT_EQ(file->image.pixel(x, y)[4], 0.0f);
+    for (int x = 0; x < 48; ++x) EXPECT_EQ(value(file->image, x, y, "lod.level"), 0.0f);
 }
 
 TEST_F(Shot, BadArgumentsAreErrors) {

@@ -12,6 +12,7 @@
 #include "prefilter/condition.h"
 #include "tests/support/files.h"
 #include "tests/support/gltf_files.h"
+#include "tests/support/imported_surface.h"
 #include "tests/support/png_files.h"
 
 namespace farfield {
@@ -184,7 +185,7 @@ TEST(AlphaCut, NeighboursFitWithoutCracksOrTJunctions) {
     }
   }
   const TemporaryFolder folder;
-  const auto asset = import_asset(write_strip(folder, cards, png(size, size, texels)));
+  const auto asset = test::import_surface(write_strip(folder, cards, png(size, size, texels)));
   ASSERT_TRUE(asset) << asset.error().message;
   const Surface& s = asset->surface;
   EXPECT_GT(s.triangles.size(), 50u);
@@ -221,7 +222,7 @@ TEST(AlphaCut, SameMeshForAnyNumberOfThreads) {
   const auto file = write_strip(folder, 9, png(64, 64, texels));
   const auto with_threads = [&](int threads) {
     const ThreadLimit limit(threads);
-    return import_asset(file);
+    return test::import_surface(file);
   };
   const auto first = with_threads(1), second = with_threads(4);
   ASSERT_TRUE(first && second);

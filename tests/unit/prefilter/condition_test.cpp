@@ -10,6 +10,7 @@
 
 #include "tests/support/files.h"
 #include "tests/support/gltf_files.h"
+#include "tests/support/imported_surface.h"
 #include "tests/support/png_files.h"
 
 namespace farfield {
@@ -31,7 +32,9 @@ float srgb(int byte) {
 }
 
 /// Mean material of the first and last face.
-const FaceMaterial& first_material(const Result<ImportedAsset>& asset) { return asset->surface.materials.front(); }
+const FaceMaterial& first_material(const Result<test::ImportedSurface>& asset) {
+  return asset->surface.materials.front();
+}
 
 // ---- OBJ
 
@@ -44,7 +47,7 @@ TEST(ImportObj, FaceOfThousandCornersIsKeptWhole) {
   obj += "f";
   for (int i = 1; i <= n; ++i) obj += fmt::format(" {}", i);
   const TemporaryFolder folder;
-  const auto asset = import_asset(folder.write("disc.obj", obj));
+  const auto asset = test::import_surface(folder.write("disc.obj", obj));
   ASSERT_TRUE(asset) << asset.error().message;
   EXPECT_EQ(asset->surface.triangles.size(), 998u);
 }
@@ -55,7 +58,7 @@ TEST(ImportObj, AllWaysToWriteAFaceAreOne) {
        {"f 1 2 3 4", "f 1// 2// 3// 4//", "f 1/1 2/1 3/1 4/1", "f 1//1 2//1 3//1 4//1", "f 1/1/1 2/1/1 3/1/1 4/1/1",
         "f -4 -3 -2 -1", "f\t1 \\\n 2 3 \\\r\n4\r", "f 1/-1/-1 2/-1/-1 3/-1/-1 4/-1/-1", "f 1 2 3 4 # end"}) {
     const auto asset =
-        import_asset(folder.write("quad.obj", std::string(kQuadObj) + "vt 0 0\nvn 0 0 1\n# C:\\\n" + face));
+        test::import_surface(folder.write("quad.obj", std::string(kQuadObj) + "vt 0 0\nvn 0 0 1\n# C:\\\n" + face));
     ASSERT_TRUE(asset) << face << ": " << asset.error().message;
     EXPECT_EQ(asset->surface.triangles.size(), 2u) << face;
     EXPECT_EQ(asset->surface.positions.size(), 4u) << face;
@@ -69,7 +72,7 @@ TEST(ImportObj, BlenderMaterialsMeanWhatBlenderMeans) {
                "# Blender 3.4.1 MTL File: 'None'\nnewmtl a\nNs 250\nKa 1 1 1\nKd 0.45 0.25 0.12\nKs 0.5 0.5 0.5\nNi "
                "1.45\nd 1\nillum 2\n");
   const auto asset =
-      import_asset(folder.write("a.obj", std::string("mtllib m.mtl\nusemtl a\n") + kQuadObj + "f 1 2 3 4\n"));
+      test::import_surface(folder.write("a.obj", std::string("mtllib m.mtl\nusemtl a\n") + kQuadObj + "f 1 2 3 4\n"));
   ASSERT_TRUE(asset) << asset.error().message;
   const FaceMaterial& m = first_material(asset);
   expect_near(m.specular, vec3(0.04f));                       // 0.08 Ks
@@ -84,8 +87,8 @@ TEST(ImportObj, PhongAndPbrMaterialsOfOtherPrograms) {
                "newmtl phong\nKd 0.2 0.2 0.2\nKs 0.3 0.3 0.3\nNs 30\nillum 2\nnewmtl pbr\nKd 1 0 0\nPr 0.5\nPm 1\n"
                "newmtl plain\nKd 0.5 0.5 0.5\nKs 1 1 1\nillum 1\n");
   const std::string obj = std::string("mtllib m.mtl\n") + kQuadObj + "v 0 0 5\nv 0 0 6\n";
-  const auto asset =
-      import_asset(folder.write("a.obj", obj + "usemtl phong\nf 1 2 5\nusemtl pbr\nf 1 2 6\nusemtl plain\nf 3 2 6\n"));
+  const auto asset = test::import_surface(
+      folder.write("a.obj", obj + "usemtl phong\nf 1 2 5\nusemtl pbr\nf 1 2 6\nusemtl plain\nf 3 2 6\n"));
   ASSERT_TRUE(asset) << asset.error().message;
   const auto& m = asset->surface.materials;
   ASSERT_EQ(m.size(), 3u);
@@ -104,7 +107,7 @@ TEST(ImportObj, TexturesAreFoundAveragedAndTheRightWayUp) {
   folder.write("maps/t.png", png(2, 2, {{255, 0, 0, 255}, {255, 0, 0, 255}, {0, 0, 255, 255}, {0, 0, 255, 255}}));
   folder.write("m.mtl", "newmtl a\nKd 1 1 1\nmap_Kd maps\\t.png\n");
   const std::string obj = std::string("mtllib m.mtl\nusemtl a\n") + kQuadObj + "vt 0 0.5\nvt 1 0.5\nvt 1 1\nvt 0 1\n";
-  const auto asset = import_asset(folder.write("a.obj", obj + "f 1/1 2/2 3/3 4/4\n"));
+  const auto asset = test::import_surface(folder.write("a.obj", obj + "f 1/1 2/2 3/3 4/4\n"));
   ASSERT_TRUE(asset) << asset.error().message;
   for (const FaceMaterial& m : asset->surface.materials) expect_near(m.diffuse, vec3(1, 0, 0), 1e-4f);
 }
@@ -116,9 +119,9 @@ TEST(ImportObj, CuttingMasksStopsWhenAsked) {
   const std::string obj = std::string("mtllib m.mtl\nusemtl a\n") + kQuadObj + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
   const fs::path path = folder.write("a.obj", obj + "f 1/1 2/2 3/3 4/4\n");
   std::atomic<bool> cancel{false};
-  EXPECT_TRUE(import_asset(path, {}, {{}, &cancel}));
+  EXPECT_TRUE(test::import_surface(path, {}, {{}, &cancel}));
   cancel = true;
-  const auto asset = import_asset(path, {}, {{}, &cancel});
+  const auto asset = test::import_surface(path, {}, {{}, &cancel});
   ASSERT_FALSE(asset);
   EXPECT_EQ(asset.error().code, ErrorCode::Cancelled);
 }
@@ -132,13 +135,13 @@ TEST(ImportObj, DissolveMapCutsTheFace) {
   folder.write("mask.png", png(64, 64, texels));
   folder.write("m.mtl", "newmtl a\nKd 0.3 0.6 0.9\nmap_d -clamp on mask.png\n");
   const std::string obj = std::string("mtllib m.mtl\nusemtl a\n") + kQuadObj + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
-  const auto asset = import_asset(folder.write("a.obj", obj + "f 1/1 2/2 3/3 4/4\n"));
+  const auto asset = test::import_surface(folder.write("a.obj", obj + "f 1/1 2/2 3/3 4/4\n"));
   ASSERT_TRUE(asset) << asset.error().message;
   // RGBA image: alpha is its mask channel, and that is 1 everywhere
   EXPECT_EQ(asset->surface.triangles.size(), 2u);
   for (auto& t : texels) t[3] = t[0];
   folder.write("mask.png", png(64, 64, texels));
-  const auto cut = import_asset(folder.path() / "a.obj");
+  const auto cut = test::import_surface(folder.path() / "a.obj");
   ASSERT_TRUE(cut) << cut.error().message;
   EXPECT_NEAR(cut->surface.bounds().upper.x, 0.25, 0.01);
   EXPECT_NE(cut->source_hash, asset->source_hash);  // the texture is part of the source
@@ -148,7 +151,7 @@ TEST(ImportObj, MissingTextureIsAWarningAndThePlainColour) {
   const TemporaryFolder folder;
   folder.write("m.mtl", "newmtl a\nKd 0.1 0.2 0.3\nmap_Kd nowhere.png\n");
   const auto asset =
-      import_asset(folder.write("a.obj", std::string("mtllib m.mtl\nusemtl a\n") + kQuadObj + "f 1 2 3\n"));
+      test::import_surface(folder.write("a.obj", std::string("mtllib m.mtl\nusemtl a\n") + kQuadObj + "f 1 2 3\n"));
   ASSERT_TRUE(asset) << asset.error().message;
   expect_near(first_material(asset).diffuse, vec3(0.1f, 0.2f, 0.3f));
   ASSERT_EQ(asset->warnings.size(), 1u);
@@ -158,7 +161,7 @@ TEST(ImportObj, MissingTextureIsAWarningAndThePlainColour) {
 TEST(ImportObj, VertexColoursAreSrgbAndTintTheMaterial) {
   const TemporaryFolder folder;
   const auto asset =
-      import_asset(folder.write("a.obj", "v 0 0 0 0.5 0 1\nv 1 0 0 0.5 0 1\nv 0 1 0 0.5 0 1\nf 1 2 3\n"));
+      test::import_surface(folder.write("a.obj", "v 0 0 0 0.5 0 1\nv 1 0 0 0.5 0 1\nv 0 1 0 0.5 0 1\nf 1 2 3\n"));
   ASSERT_TRUE(asset) << asset.error().message;
   expect_near(first_material(asset).diffuse, vec3(0.21404f, 0, 1), 1e-4f);
 }
@@ -167,8 +170,9 @@ TEST(ImportObj, LibraryNameWithBlanksAndGzippedLibrary) {
   const TemporaryFolder folder;
   folder.write("my maps.mtl", "newmtl a\nKd 0.1 0.1 0.1\n");
   folder.write("packed.mtl.gz", gzip("newmtl b\nKd 0.9 0.9 0.9\n"));
-  const auto asset = import_asset(folder.write("a.obj.gz", gzip(std::string("mtllib my maps.mtl\nmtllib packed.mtl\n") +
-                                                                kQuadObj + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n")));
+  const auto asset =
+      test::import_surface(folder.write("a.obj.gz", gzip(std::string("mtllib my maps.mtl\nmtllib packed.mtl\n") +
+                                                         kQuadObj + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n")));
   ASSERT_TRUE(asset) << asset.error().message;
   EXPECT_TRUE(asset->warnings.empty());
   expect_near(asset->surface.materials[0].diffuse, vec3(0.1f));
@@ -177,7 +181,7 @@ TEST(ImportObj, LibraryNameWithBlanksAndGzippedLibrary) {
 
 TEST(ImportObj, WithoutMaterialFacesAreBlendersGrey) {
   const TemporaryFolder folder;
-  const auto asset = import_asset(folder.write("a.obj", std::string(kQuadObj) + "f 1 2 3\n"));
+  const auto asset = test::import_surface(folder.write("a.obj", std::string(kQuadObj) + "f 1 2 3\n"));
   ASSERT_TRUE(asset);
   expect_near(first_material(asset).diffuse, vec3(0.8f));
   expect_near(first_material(asset).specular, vec3(0.0f));
@@ -214,7 +218,7 @@ TEST(ImportPly, AllEncodingsGiveTheSameSurface) {
       folder.write("b.ply",
                    "ply\nformat binary_big_endian 1.0\ncomment end_header is not here\n" + head + encode(true))};
   for (const fs::path& file : files) {
-    const auto asset = import_asset(file);
+    const auto asset = test::import_surface(file);
     ASSERT_TRUE(asset) << asset.error().message;
     ASSERT_EQ(asset->surface.positions.size(), 3u);
     EXPECT_EQ(asset->surface.positions[2], vec3(0, 2.5f, 0));
@@ -224,10 +228,10 @@ TEST(ImportPly, AllEncodingsGiveTheSameSurface) {
 
 TEST(ImportPly, FacesMayComeBeforeVerticesAndCarryColours) {
   const TemporaryFolder folder;
-  const auto asset =
-      import_asset(folder.write("a.ply", std::string("ply\nformat ascii 1.0\n") + kPlyFace +
-                                             "property uchar red\nproperty uchar green\nproperty uchar blue\n" +
-                                             kPlyVertex + "end_header\n3 0 1 2 255 0 128\n0 0 0\n1 0 0\n0 1 0\n"));
+  const auto asset = test::import_surface(
+      folder.write("a.ply", std::string("ply\nformat ascii 1.0\n") + kPlyFace +
+                                "property uchar red\nproperty uchar green\nproperty uchar blue\n" + kPlyVertex +
+                                "end_header\n3 0 1 2 255 0 128\n0 0 0\n1 0 0\n0 1 0\n"));
   ASSERT_TRUE(asset) << asset.error().message;
   expect_near(first_material(asset).diffuse, vec3(1, 0, srgb(128)));
 }
@@ -255,7 +259,7 @@ TEST(ImportPly, BrokenHeadersAndIndicesAreRefusedWithAReason) {
        "promises 99999999999"},
   };
   for (const auto& c : cases) {
-    const auto asset = import_asset(folder.write("broken.ply", c.text));
+    const auto asset = test::import_surface(folder.write("broken.ply", c.text));
     ASSERT_FALSE(asset) << c.reason;
     EXPECT_EQ(asset.error().code, ErrorCode::BadFile);
     EXPECT_NE(asset.error().message.find(c.reason), std::string::npos) << asset.error().message;
@@ -283,7 +287,7 @@ std::string material_file(const std::string& material, const std::string& member
 
 TEST(ImportGltf, MetallicRoughnessMapsToFaceMaterial) {
   const TemporaryFolder folder;
-  const auto asset = import_asset(folder.write(
+  const auto asset = test::import_surface(folder.write(
       "m.glb",
       material_file(
           R"({"pbrMetallicRoughness":{"baseColorFactor":[0.5,0.25,0.125,1],"metallicFactor":0.25,"roughnessFactor":0.5}})")));
@@ -296,7 +300,7 @@ TEST(ImportGltf, MetallicRoughnessMapsToFaceMaterial) {
 
 TEST(ImportGltf, SpecularIorAndDiffuseTransmissionExtensions) {
   const TemporaryFolder folder;
-  const auto asset = import_asset(folder.write(
+  const auto asset = test::import_surface(folder.write(
       "m.glb", material_file(
                    R"({"pbrMetallicRoughness":{"baseColorFactor":[0.5,0.5,0.5,1],"metallicFactor":0},"extensions":{
           "KHR_materials_ior":{"ior":1.45},
@@ -326,7 +330,7 @@ TEST(ImportGltf, WebpTexturesAndSpecularGlossinessAreRead) {
 
 TEST(ImportGltf, ExtensionsThatAreNotReadAreNamedOnce) {
   const TemporaryFolder folder;
-  const auto asset = import_asset(folder.write(
+  const auto asset = test::import_surface(folder.write(
       "m.glb", material_file("{}", R"("extensionsUsed":["KHR_materials_ior","EXT_of_tomorrow","EXT_of_tomorrow"])")));
   ASSERT_TRUE(asset) << asset.error().message;
   ASSERT_EQ(asset->warnings.size(), 1u);
@@ -348,13 +352,13 @@ TEST(ImportGltf, TextureTransformMovesTheFootprint) {
   const auto half = [](const std::string& members) {
     return R"(,"extensions":{"KHR_texture_transform":{)" + members + "}}";
   };
-  const auto left = import_asset(folder.write("l.glb", file(half(R"("scale":[0.5,1])"))));
-  const auto right = import_asset(folder.write("r.glb", file(half(R"("scale":[0.5,1],"offset":[0.5,0])"))));
+  const auto left = test::import_surface(folder.write("l.glb", file(half(R"("scale":[0.5,1])"))));
+  const auto right = test::import_surface(folder.write("r.glb", file(half(R"("scale":[0.5,1],"offset":[0.5,0])"))));
   ASSERT_TRUE(left && right);
   expect_near(first_material(left).diffuse, vec3(0.96f, 0, 0), 1e-3f);
   expect_near(first_material(right).diffuse, vec3(0, 0.96f, 0), 1e-3f);
   // A triangle over the whole image: three quarters of it lie on the left half.
-  const auto whole = import_asset(folder.write("w.glb", file("")));
+  const auto whole = test::import_surface(folder.write("w.glb", file("")));
   ASSERT_TRUE(whole);
   expect_near(first_material(whole).diffuse, 0.96f * vec3(0.75f, 0.25f, 0), 1e-3f);
 }
@@ -362,7 +366,7 @@ TEST(ImportGltf, TextureTransformMovesTheFootprint) {
 TEST(ImportGltf, VertexColoursAreLinearAndMultiply) {
   const TemporaryFolder folder;
   const std::string colors = raw<uint8_t>({255, 128, 0, 255, 255, 128, 0, 255, 255, 128, 0, 255});
-  const auto asset = import_asset(folder.write(
+  const auto asset = test::import_surface(folder.write(
       "c.glb",
       material_file(R"({"pbrMetallicRoughness":{"baseColorFactor":[0.5,0.5,0.5,1],"metallicFactor":0}})", "",
                     R"(,"COLOR_0":1)",
@@ -379,7 +383,7 @@ TEST(ImportGltf, QuantizedPositionsAreDecoded) {
       "accessors":[{"bufferView":0,"componentType":5122,"normalized":true,"count":3,"type":"VEC3"}],
       "bufferViews":[{"buffer":0,"byteLength":24,"byteStride":8}],"buffers":[{"byteLength":24}]})";
   const TemporaryFolder folder;
-  const auto asset = import_asset(folder.write("q.glb", glb(json, shorts)));
+  const auto asset = test::import_surface(folder.write("q.glb", glb(json, shorts)));
   ASSERT_TRUE(asset) << asset.error().message;
   EXPECT_EQ(asset->surface.bounds().lower, vec3(0, -2, 0));
   EXPECT_EQ(asset->surface.bounds().upper, vec3(2, 0, 0));
@@ -393,7 +397,8 @@ TEST(ImportGltf, OneMeshComesInItsOwnSpaceAllNodesInTheWorld) {
       "bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36}]})";
   const TemporaryFolder folder;
   const auto file = folder.write("i.glb", glb(json, raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 1})));
-  const auto one = import_asset(file, {0}), all = import_asset(file), none = import_asset(file, {1});
+  const auto one = test::import_surface(file, {0}), all = test::import_surface(file),
+             none = test::import_surface(file, {1});
   ASSERT_TRUE(one && all);
   EXPECT_EQ(one->surface.triangles.size(), 1u);
   EXPECT_EQ(one->surface.bounds().upper, vec3(1, 1, 1));
@@ -416,7 +421,7 @@ TEST(ImportGltf, CountsWithoutBytesBehindThemAllocateNothing) {
         "indices":{{"bufferView":0,"componentType":5125}},"values":{{"bufferView":0}}}}}}],
         "bufferViews":[{{"buffer":0,"byteLength":36}}],"buffers":[{{"byteLength":36}}]}})",
                     count);
-    EXPECT_FALSE(import_asset(folder.write("lie.glb", glb(json, std::string(36, '\0')))));
+    EXPECT_FALSE(test::import_surface(folder.write("lie.glb", glb(json, std::string(36, '\0')))));
   }
 }
 
@@ -425,13 +430,13 @@ TEST(ImportGltf, CountsWithoutBytesBehindThemAllocateNothing) {
 TEST(Import, UnknownKindsAreRefusedByName) {
   const TemporaryFolder folder;
   for (const char* name : {"scene.fbx", "cloud.vdb", "cloud.nvdb.gz", "noextension"}) {
-    const auto asset = import_asset(folder.write(name, "whatever"));
+    const auto asset = test::import_surface(folder.write(name, "whatever"));
     ASSERT_FALSE(asset);
     EXPECT_EQ(asset.error().code, ErrorCode::Unsupported);
     EXPECT_NE(asset.error().message.find(name), std::string::npos);
   }
-  EXPECT_EQ(import_asset(folder.path() / "missing.obj").error().code, ErrorCode::NotFound);
-  EXPECT_EQ(import_asset(folder.write("a.obj", std::string(kQuadObj) + "f 1 2 3"), {0}).error().code,
+  EXPECT_EQ(test::import_surface(folder.path() / "missing.obj").error().code, ErrorCode::NotFound);
+  EXPECT_EQ(test::import_surface(folder.write("a.obj", std::string(kQuadObj) + "f 1 2 3"), {0}).error().code,
             ErrorCode::InvalidArgument);
 }
 
@@ -439,7 +444,7 @@ TEST(Import, SizesThatSinglePrecisionCannotHoldAreRefusedWithTheRemedy) {
   const TemporaryFolder folder;
   for (const char* size : {"1e-30", "1e30", "1e300"}) {
     const auto asset =
-        import_asset(folder.write("a.obj", fmt::format("v 0 0 0\nv {0} 0 0\nv 0 {0} 0\nf 1 2 3\n", size)));
+        test::import_surface(folder.write("a.obj", fmt::format("v 0 0 0\nv {0} 0 0\nv 0 {0} 0\nf 1 2 3\n", size)));
     ASSERT_FALSE(asset) << size;
     EXPECT_EQ(asset.error().code, ErrorCode::Unsupported);
     EXPECT_NE(asset.error().message.find("scale it"), std::string::npos);
@@ -464,9 +469,9 @@ std::vector<std::pair<std::string, std::string>> valid_files() {
 TEST(Import, EveryTruncationLoadsOrFailsButNeverCrashes) {
   const TemporaryFolder folder;
   for (const auto& [name, content] : valid_files()) {
-    ASSERT_TRUE(import_asset(folder.write(name, content))) << name;
+    ASSERT_TRUE(test::import_surface(folder.write(name, content))) << name;
     for (size_t length = 0; length < content.size(); ++length)
-      import_asset(folder.write(name, content.substr(0, length)));
+      test::import_surface(folder.write(name, content.substr(0, length)));
   }
 }
 
@@ -477,7 +482,7 @@ TEST(Import, FlippedBytesLoadOrFailButNeverCrash) {
     for (int run = 0; run < 400; ++run) {
       std::string broken = content;
       for (int flips = 1 + run % 4; flips > 0; --flips) broken[rng() % broken.size()] = static_cast<char>(rng());
-      const auto asset = import_asset(folder.write(name, broken));
+      const auto asset = test::import_surface(folder.write(name, broken));
       if (!asset) continue;
       for (const vec3& p : asset->surface.positions) ASSERT_TRUE(is_finite(p)) << name << " run " << run;
     }

@@ -140,14 +140,14 @@ TEST(FaceTextures, MetalTexelsTakeTheirColourIntoTheHighlight) {
   m.metallic = 1;
   m.dielectric_f0 = vec3(0.04f);
   const UvTriangle halves[2] = {{vec2(0, 0), vec2(0.25f, 0), vec2(0.25f, 1)}, {vec2(0.75f, 0), vec2(1, 0), vec2(1, 1)}};
-  const FaceMaterial left = face_material(m, average_textures(m, halves[0]), vec3(1.0f), vec3(0, 0, 1));
-  const FaceMaterial right = face_material(m, average_textures(m, halves[1]), vec3(1.0f), vec3(0, 0, 1));
+  const MaterialSample left = material_sample(m, average_textures(m, halves[0]), vec3(1.0f));
+  const MaterialSample right = material_sample(m, average_textures(m, halves[1]), vec3(1.0f));
   expect_near(left.diffuse, vec3(0.96f, 0, 0), 1e-3f);
   expect_near(left.specular, vec3(0.04f), 1e-3f);
-  EXPECT_NEAR(left.roughness2, 1.0 / 16, 1e-3);
+  EXPECT_NEAR(left.roughness, 0.5, 1e-3);
   expect_near(right.diffuse, vec3(0.0f), 1e-3f);
   expect_near(right.specular, vec3(0, 1, 0), 1e-3f);
-  EXPECT_NEAR(right.roughness2, 1, 1e-3);
+  EXPECT_NEAR(right.roughness, 1, 1e-3);
 }
 
 TEST(FaceTextures, NoChannelEverReflectsMoreThanItGets) {
@@ -160,7 +160,7 @@ TEST(FaceTextures, NoChannelEverReflectsMoreThanItGets) {
     m.dielectric_f0 = vec3(any(rng), 1, 0.04f);
     m.diffuse_transmission = any(rng);
     m.roughness = any(rng);
-    const FaceMaterial f = face_material(m, average_textures(m, {}), vec3(2.0f, 1, 1), vec3(0, 0, 1));
+    const MaterialSample f = material_sample(m, average_textures(m, {}), vec3(2.0f, 1, 1));
     for (int c = 0; c < 3; ++c) {
       EXPECT_LE(f.diffuse[c] + f.specular[c] + f.transmission[c], 1 + 1e-6f);
       EXPECT_GE(std::min({f.diffuse[c], f.specular[c], f.transmission[c]}), 0.0f);

@@ -5,6 +5,7 @@
 
 #include "prefilter/condition.h"
 #include "tests/support/files.h"
+#include "tests/support/imported_surface.h"
 
 namespace farfield {
 namespace {
@@ -20,7 +21,7 @@ struct Seen {
 };
 
 Seen see(const fs::path& file) {
-  const auto asset = import_asset(file);
+  const auto asset = test::import_surface(file);
   EXPECT_TRUE(asset) << asset.error().message;
   Seen seen;
   if (!asset) return seen;

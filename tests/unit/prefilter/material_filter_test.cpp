@@ -12,7 +12,8 @@ namespace {
 FaceMaterial random_material(std::mt19937& rng) {
   std::uniform_real_distribution<float> u;
   const auto color = [&] { return vec3(u(rng), u(rng), u(rng)); };
-  return {{u(rng), u(rng), u(rng), u(rng), u(rng), u(rng)}, color(), color(), color(), u(rng)};
+  const auto matrix = [&] { return SymMat3{u(rng), u(rng), u(rng), u(rng), u(rng), u(rng)}; };
+  return {matrix(), color(), color(), color(), u(rng), matrix(), u(rng), color()};
 }
 
 FaceMaterial mean_material(const std::vector<double>& area, const std::vector<FaceMaterial>& materials) {

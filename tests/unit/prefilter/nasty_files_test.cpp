@@ -11,6 +11,7 @@
 #include "prefilter/condition.h"
 #include "tests/support/files.h"
 #include "tests/support/gltf_files.h"
+#include "tests/support/imported_surface.h"
 
 namespace farfield {
 namespace {
@@ -85,7 +86,7 @@ TEST_P(NastyFile, LoadsOrIsRefusedAsExpected) {
   const std::string load = expectations()[name]["load"];
   const fs::path file = find_or_make(name, folder);
   ASSERT_TRUE(fs::exists(file)) << file;
-  const auto asset = import_asset(file);
+  const auto asset = test::import_surface(file);
   if (asset) {
     EXPECT_NE(load, "refuse");
     expect_usable(asset->surface);
@@ -106,7 +107,7 @@ INSTANTIATE_TEST_SUITE_P(All, NastyFile, ::testing::ValuesIn(names()), test_name
 
 // ---- what exactly comes out of those that load
 
-Result<ImportedAsset> import_nasty(const std::string& name) { return import_asset(kNasty / name); }
+Result<test::ImportedSurface> import_nasty(const std::string& name) { return test::import_surface(kNasty / name); }
 
 double area(const Surface& surface) {
   double sum = 0;

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "prefilter/condition.h"
+#include "tests/support/imported_surface.h"
 
 namespace farfield {
 namespace {
@@ -45,7 +46,7 @@ TEST(SharedAssets, MeshesHaveTheTrianglesAndSizeOfTheReadme) {
   };
   SKIP_WITHOUT(kAssets / expected[0].file);
   for (const auto& e : expected) {
-    const auto asset = import_asset(kAssets / e.file);
+    const auto asset = test::import_surface(kAssets / e.file);
     ASSERT_TRUE(asset) << asset.error().message;
     EXPECT_EQ(asset->surface.triangles.size(), e.triangles) << e.file;
     EXPECT_EQ(asset->surface.materials.size(), e.triangles) << e.file;
@@ -56,9 +57,9 @@ TEST(SharedAssets, MeshesHaveTheTrianglesAndSizeOfTheReadme) {
 
 TEST(SharedAssets, MapleIsTheSameTreeFromObjGltfAndPly) {
   SKIP_WITHOUT(kAssets / "trees/small_maple.obj.gz");
-  const auto obj = import_asset(kAssets / "trees/small_maple.obj.gz");
-  const auto glb = import_asset(kAssets / "trees/small_maple.glb.gz");
-  const auto ply = import_asset(kAssets / "trees/small_maple.ply.gz");
+  const auto obj = test::import_surface(kAssets / "trees/small_maple.obj.gz");
+  const auto glb = test::import_surface(kAssets / "trees/small_maple.glb.gz");
+  const auto ply = test::import_surface(kAssets / "trees/small_maple.ply.gz");
   ASSERT_TRUE(obj && glb && ply);
   // Six decimals of the OBJ keep some vertices apart, or join them, that floats do not.
   EXPECT_NEAR(static_cast<double>(obj->surface.positions.size()), static_cast<double>(glb->surface.positions.size()),
@@ -81,12 +82,12 @@ TEST(SharedAssets, MapleIsTheSameTreeFromObjGltfAndPly) {
 TEST(SharedAssets, LeafCardsAreCutToTheShareOfTheirMask) {
   const fs::path file = kAssets / "trees/small_maple_cards.glb";
   SKIP_WITHOUT(file);
-  const auto asset = import_asset(file);
+  const auto asset = test::import_surface(file);
   ASSERT_TRUE(asset) << asset.error().message;
   EXPECT_LT(asset->surface.triangles.size(), 1'200'000u);
   EXPECT_GT(asset->surface.triangles.size(), 8628u * 20 + 43000);
   // Mesh 1 is the bark; mesh 0 the cards, whose masks leave 21.18 % of their area (counted in the PNGs).
-  const auto cards = import_asset(file, {0});
+  const auto cards = test::import_surface(file, {0});
   ASSERT_TRUE(cards) << cards.error().message;
   const auto area = [](const Surface& s) {
     double sum = 0;
@@ -108,7 +109,7 @@ TEST(SharedAssets, ForestMeshesImportOneByOne) {
   SKIP_WITHOUT(file);
   const size_t triangles[] = {46218, 25188, 30902, 18432};
   for (int mesh = 0; mesh < 4; ++mesh) {
-    const auto asset = import_asset(file, {mesh});
+    const auto asset = test::import_surface(file, {mesh});
     ASSERT_TRUE(asset) << asset.error().message;
     EXPECT_EQ(asset->surface.triangles.size(), triangles[mesh]) << mesh;
   }
@@ -141,7 +142,7 @@ TEST(SharedAssets, GltfImportFilesLoadOrAreRefusedByName) {
       {"tinygltf/regression/zero-sized-bin-chunk-issue-440.glb", 1, ""},
   };
   for (const auto& e : expected) {
-    const auto asset = import_asset(root / e.file);
+    const auto asset = test::import_surface(root / e.file);
     if (e.triangles > 0) {
       ASSERT_TRUE(asset) << asset.error().message;
       EXPECT_EQ(asset->surface.triangles.size(), e.triangles) << e.file;
@@ -156,7 +157,7 @@ TEST(SharedAssets, GltfImportFilesLoadOrAreRefusedByName) {
 TEST(SharedAssets, TextureWithBlanksInItsNameIsFound) {
   const fs::path file = kAssets / "gltf-import/tinygltf/CubeImageUriSpaces/CubeImageUriSpaces.gltf";
   SKIP_WITHOUT(file);
-  const auto asset = import_asset(file);
+  const auto asset = test::import_surface(file);
   ASSERT_TRUE(asset) << asset.error().message;
   EXPECT_TRUE(asset->warnings.empty());
 }
@@ -164,7 +165,7 @@ TEST(SharedAssets, TextureWithBlanksInItsNameIsFound) {
 TEST(SharedAssets, VolumesAreRefusedAsVolumes) {
   SKIP_WITHOUT(kAssets / "volumes");
   for (const char* name : {"cloud.vdb", "cloud.nvdb.gz", "cloud_fp8.nvdb", "cloud_half.vol.gz"}) {
-    const auto asset = import_asset(kAssets / "volumes" / name);
+    const auto asset = test::import_surface(kAssets / "volumes" / name);
     ASSERT_FALSE(asset);
     EXPECT_EQ(asset.error().code, ErrorCode::Unsupported);
     EXPECT_NE(asset.error().message.find("volume"), std::string::npos);

@@ -10,6 +10,7 @@
 #include "prefilter/condition.h"
 #include "prefilter/macrosurface.h"
 #include "prefilter/simplify.h"
+#include "tests/support/imported_surface.h"
 #include "tests/support/surfaces.h"
 
 namespace farfield {
@@ -70,7 +71,7 @@ TEST(SurfaceAssets, EveryBrokenAssetThatImportsGoesThroughAllLevels) {
   size_t imported = 0;
   for (const fs::path& file : files) {
     SCOPED_TRACE(file.string());
-    const auto asset = import_asset(file);
+    const auto asset = test::import_surface(file);
     if (!asset) continue;  // import's own tests say which must
     ++imported;
     expect_sound_cascade(asset->surface);
@@ -85,7 +86,7 @@ TEST(SurfaceAssets, RealMeshesKeepTheirAreaLevelByLevel) {
     if (!fs::exists(shared_assets() / name)) continue;
     ++found;
     SCOPED_TRACE(name);
-    const auto asset = import_asset(shared_assets() / name);
+    const auto asset = test::import_surface(shared_assets() / name);
     ASSERT_TRUE(asset) << asset.error().message;
     Surface surface = asset->surface;
     const float side = max_component(surface.bounds().size());
@@ -108,7 +109,7 @@ TEST(SurfaceAssets, RealMeshesKeepTheirAreaLevelByLevel) {
 TEST(SurfaceAssets, LeavesAndTwigsOfATreeLeaveTheSurfaceLevelByLevel) {
   const fs::path file = shared_assets() / "trees/small_maple.obj.gz";
   if (!fs::exists(file)) GTEST_SKIP() << file << " is absent";
-  const auto asset = import_asset(file);
+  const auto asset = test::import_surface(file);
   ASSERT_TRUE(asset) << asset.error().message;
   Surface surface = asset->surface;
   const float side = max_component(surface.bounds().size());

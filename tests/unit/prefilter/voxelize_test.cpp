@@ -71,6 +71,16 @@ TEST(Voxelize, OfASparseCloudKeepsItsTotalArea) {
   }
 }
 
+TEST(Voxelize, FacesCountByTheirOpacity) {
+  LeafCloud cloud;
+  cloud.leaf_size = 0.012f;
+  Surface leaves = leaf_cloud(cloud);
+  for (FaceMaterial& material : leaves.materials) material.opacity = 0.3f, material.emission = {8, 4, 2};
+  const SparseVolume volume = voxelized(leaves, 1.0 / 16);
+  EXPECT_NEAR(flake_area(volume) / total_area(leaves), 0.3, 0.01);
+  for (const Voxel& v : volume.voxels) EXPECT_NEAR(v.emission.x, 8, 1e-3f);
+}
+
 TEST(Voxelize, ThinsOutFaintVoxelsButKeepsTheirArea) {
   // 20000 specks: voxels of a mean depth of 0.006, so about one in three is kept, at kFaintestDepth. About 1100 voxels:
   // standard error 3 %.
