@@ -489,8 +489,8 @@ Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, con
   report.manifest = make_manifest(source_name, asset.source_hash, options);
   report.manifest.source_files = std::move(asset.source_files);
   report.manifest.warnings = std::move(asset.warnings);
-  if (auto manifest = read_manifest(out);
-      manifest && are_same_bake(*manifest, report.manifest) && is_whole(out, *manifest)) {
+  if (auto manifest = read_manifest(out); !options.even_if_up_to_date && manifest &&
+                                          are_same_bake(*manifest, report.manifest) && is_whole(out, *manifest)) {
     report.manifest = std::move(*manifest);
     report.up_to_date = true;
     report.total_seconds = watch.seconds();
