@@ -8,6 +8,7 @@
 
 #include "base/hash.h"
 #include "base/result.h"
+#include "import/corner_normals.h"
 #include "import/gltf_document.h"
 #include "import/read_formats.h"
 
@@ -474,9 +475,7 @@ class GltfMeshReader {
     for (const uvec3& t : triangles) {
       for (int k = 0; k < 3; ++k) {
         const double* n = &values[3 * size_t{t[k]}];
-        const dvec3 normal = normal_to_world * dvec3(n[0], n[1], n[2]);
-        const double length = glm::length(normal);
-        mesh_.corner_normal.push_back(length > 0 ? vec3(normal / length) : vec3(0.0f));
+        mesh_.corner_normal.push_back(unit_normal(normal_to_world * dvec3(n[0], n[1], n[2])));
       }
     }
     return {};
