@@ -136,9 +136,7 @@ class SceneReader {
 
   Result<GltfScene> read() {
     scene_.warnings = document_.warnings;
-    for (size_t m = 0; m < model_.meshes.size(); ++m) {
-      FARFIELD_TRY(read_mesh(m));
-    }
+    for (size_t m = 0; m < model_.meshes.size(); ++m) scene_.meshes.push_back(read_mesh_or_nothing(m));
     const std::vector<int> order = scene_nodes(document_);
     flatten_nodes(order);
     for (const auto& animation : model_.animations) {
@@ -152,11 +150,21 @@ class SceneReader {
  private:
   void warn(std::string text) { scene_.warnings.push_back(std::move(text)); }
 
-  Result<void> read_mesh(size_t index) {
-    const auto& source = model_.meshes[index];
+  /// One broken mesh does not stop a scene: it stays empty, and is warned about.
+  GltfMesh read_mesh_or_nothing(size_t index) {
     GltfMesh mesh;
-    mesh.name = source.name;
-    mesh.asset_name = unique_name(source.name, index);
+    mesh.name = model_.meshes[index].name;
+    mesh.asset_name = unique_name(mesh.name, index);
+    if (const auto measured = measure(model_.meshes[index], mesh); !measured) {
+      warn(fmt::format("mesh {} ({}) is left out: {}", index, mesh.name, measured.error().message));
+      mesh.bounds = Box3();
+      mesh.triangle_count = 0;
+    }
+    return mesh;
+  }
+
+  /// Counts the triangles and finds the bounds.
+  Result<void> measure(const tinygltf::Mesh& source, GltfMesh& mesh) {
     for (const auto& primitive : source.primitives) {
       const auto position = primitive.attributes.find("POSITION");
       if (position == primitive.attributes.end()) continue;
@@ -168,7 +176,6 @@ class SceneReader {
       FARFIELD_TRY_LET(auto box, position_bounds(position->second));
       mesh.bounds.extend(box);
     }
-    scene_.meshes.push_back(std::move(mesh));
     return {};
   }
 

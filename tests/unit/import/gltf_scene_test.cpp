@@ -40,6 +40,18 @@ std::string scene_file(const std::string& nodes, const std::string& roots, const
   return glb(json, triangle + extra);
 }
 
+TEST(GltfScene, OneBrokenMeshIsLeftOutByName) {
+  const TemporaryFolder folder;
+  std::string file =
+      scene_file(R"({"mesh":0},{"mesh":0})", "0,1", "", "", R"({"componentType":5126,"count":3,"type":"VEC2"})");
+  const std::string whole = R"("POSITION":0}}]})", torn = R"("POSITION":1}}]})";
+  const auto broken = read_gltf_scene(folder.write("torn.glb", file.replace(file.find(whole), whole.size(), torn)));
+  ASSERT_TRUE(broken) << broken.error().message;
+  EXPECT_EQ(broken->meshes.at(0).triangle_count, 0u);
+  ASSERT_EQ(broken->warnings.size(), 1u);
+  EXPECT_NE(broken->warnings[0].find("mesh 0 (tri)"), std::string::npos) << broken->warnings[0];
+}
+
 TEST(GltfScene, ForestHasItsInstancesSpeciesSunAndCamera) {
   const fs::path file = kAssets / "forest/forest_pullback.glb";
   if (!fs::exists(file)) GTEST_SKIP() << file << " is not here";
