@@ -116,11 +116,26 @@ dmat4 world_matrix(const GltfScene& scene, uint32_t node, double seconds) {
 
 dmat4 to_square(const mat4x3& m) { return dmat4(dvec4(m[0], 0), dvec4(m[1], 0), dvec4(m[2], 0), dvec4(m[3], 1)); }
 
-mat4x3 to_affine(const dmat4& m) { return mat4x3(vec3(m[0]), vec3(m[1]), vec3(m[2]), vec3(m[3])); }
+/// In floats, seen from `origin`.
+mat4x3 to_affine(const dmat4& m, const dvec3& origin = dvec3(0.0)) {
+  return mat4x3(vec3(m[0]), vec3(m[1]), vec3(m[2]), vec3(dvec3(m[3]) - origin));
+}
 
-/// Puts a camera where its node is. Scales, mirrors and shears are taken out: forward stays, up is made upright to it.
-void place(GltfCamera& camera, const dmat4& world) {
-  camera.position = vec3(world[3]);
+vec3 corner_of(const Box3& box, int number) {
+  return vec3((number & 1 ? box.upper : box.lower).x, (number & 2 ? box.upper : box.lower).y,
+              (number & 4 ? box.upper : box.lower).z);
+}
+
+/// Whether floats are so sparse where the box lies that the steps between them could be seen on what is in it.
+bool is_far_for_its_size(const dvec3& lower, const dvec3& upper) {
+  constexpr double kFarthestInSizes = 32;  // a 2^18th of its size is then the step of a float
+  return glm::length(0.5 * (lower + upper)) > kFarthestInSizes * glm::length(upper - lower);  // false for NaN
+}
+
+/// Puts a camera where its node is, seen from `origin`. Scales, mirrors and shears are taken out: forward stays, up is
+/// made upright to it.
+void place(GltfCamera& camera, const dmat4& world, const dvec3& origin) {
+  camera.position = vec3(dvec3(world[3]) - origin);
   const dvec3 forward = -dvec3(world[2]), up(world[1]);
   if (glm::length(glm::cross(forward, up)) <= 1e-12 * glm::length(forward) * glm::length(up)) return;
   camera.forward = vec3(glm::normalize(forward));
@@ -176,6 +191,9 @@ class SceneReader {
       FARFIELD_TRY_LET(auto box, position_bounds(position->second));
       mesh.bounds.extend(box);
     }
+    if (is_far_for_its_size(dvec3(mesh.bounds.lower), dvec3(mesh.bounds.upper)))
+      warn(fmt::format("mesh {}: its points lie so far from its origin that they are coarse; move its node instead",
+                       mesh.asset_name));
     return {};
   }
 
@@ -333,6 +351,10 @@ class SceneReader {
     for (uint32_t i = 0; i < order.size(); ++i) {
       const auto& node = model_.nodes[static_cast<size_t>(order[i])];
       if (node.mesh >= 0) FARFIELD_TRY(add_instances(node, order[i], i, world[i]));
+    }
+    place_instances();
+    for (uint32_t i = 0; i < order.size(); ++i) {
+      const auto& node = model_.nodes[static_cast<size_t>(order[i])];
       if (node.camera >= 0) add_camera(node, i, world[i]);
       const auto light = node.extensions.find("KHR_lights_punctual");
       if (light != node.extensions.end()) add_light(node, light->second, i, world[i]);
@@ -355,13 +377,31 @@ class SceneReader {
       const mat4x3 in_node = to_affine(transform);
       const auto seen = first_seen(to_square(in_node));
       if (seen) {
-        scene_.instances.push_back({static_cast<uint32_t>(node.mesh), to_affine(*seen), node.name, index, in_node});
+        scene_.instances.push_back({static_cast<uint32_t>(node.mesh), mat4x3(1), node.name, index, in_node});
+        places_.push_back(*seen);
       } else {
         ++singular;
       }
     }
     if (singular > 0) warn(fmt::format("node {} ({}): its transform is singular; left out", number, node.name));
     return {};
+  }
+
+  /// Chooses the origin, the middle of all instances or zero, and puts them where they are from there.
+  void place_instances() {
+    dvec3 lower(INFINITY), upper(-INFINITY);
+    for (size_t i = 0; i < places_.size(); ++i) {
+      const Box3& bounds = scene_.meshes[scene_.instances[i].mesh].bounds;
+      if (bounds.is_empty()) continue;
+      for (int corner = 0; corner < 8; ++corner) {
+        const dvec3 point(places_[i] * dvec4(corner_of(bounds, corner), 1));
+        lower = glm::min(lower, point);
+        upper = glm::max(upper, point);
+      }
+    }
+    const vec3 middle(0.5 * (lower + upper));  // a float, so that those who have floats can add it without loss
+    if (is_far_for_its_size(lower, upper) && is_finite(middle)) scene_.origin = dvec3(middle);
+    for (size_t i = 0; i < places_.size(); ++i) scene_.instances[i].to_world = to_affine(places_[i], scene_.origin);
   }
 
   /// The keys of a node and its ancestors, and the times halfway between them, in order.
@@ -404,7 +444,7 @@ class SceneReader {
     camera.half_height = std::abs(camera.half_height);
     if (!(camera.aspect > 0) || !std::isfinite(camera.aspect)) camera.aspect = 0;
     if (!(camera.z_near > 0) || !std::isfinite(camera.z_near)) camera.z_near = 0;
-    place(camera, world);
+    place(camera, world, scene_.origin);
     scene_.cameras.push_back(std::move(camera));
   }
 
@@ -422,7 +462,7 @@ class SceneReader {
     light.name = node.name.empty() ? source.name : node.name;
     if (source.color.size() == 3) light.color = vec3(source.color[0], source.color[1], source.color[2]);
     light.intensity = static_cast<float>(source.intensity);
-    light.position = vec3(world[3]);
+    light.position = vec3(dvec3(world[3]) - scene_.origin);
     light.direction = vec3(glm::normalize(-dvec3(world[2])));
     light.inner_cone_rad = static_cast<float>(source.spot.innerConeAngle);
     light.outer_cone_rad = static_cast<float>(source.spot.outerConeAngle);
@@ -439,6 +479,7 @@ class SceneReader {
   const tinygltf::Model& model_;
   GltfScene scene_;
   std::vector<int32_t> scene_index_;  ///< of each node of the file, or -1 when it is not in the scene
+  std::vector<dmat4> places_;         ///< of the instances, in the file's coordinates
   std::set<std::string> taken_names_;
 };
 
@@ -446,7 +487,7 @@ class SceneReader {
 
 GltfCamera GltfScene::camera_at(size_t index, double seconds) const {
   GltfCamera camera = cameras[index];
-  place(camera, world_matrix(*this, camera.node, seconds));
+  place(camera, world_matrix(*this, camera.node, seconds), origin);
   return camera;
 }
 
@@ -457,7 +498,7 @@ std::vector<GltfInstance> GltfScene::instances_at(double seconds) const {
     const dmat4 to_world = world[instance.node] * to_square(instance.in_node);
     if (!is_invertible(to_world)) continue;
     placed.push_back(instance);
-    placed.back().to_world = to_affine(to_world);
+    placed.back().to_world = to_affine(to_world, origin);
   }
   return placed;
 }
@@ -467,11 +508,7 @@ Box3 GltfScene::bounds_world() const {
   for (const GltfInstance& instance : instances) {
     const Box3& local = meshes[instance.mesh].bounds;
     if (local.is_empty()) continue;
-    for (int corner = 0; corner < 8; ++corner) {
-      const vec3 p((corner & 1 ? local.upper : local.lower).x, (corner & 2 ? local.upper : local.lower).y,
-                   (corner & 4 ? local.upper : local.lower).z);
-      box.extend(instance.to_world * vec4(p, 1));
-    }
+    for (int corner = 0; corner < 8; ++corner) box.extend(instance.to_world * vec4(corner_of(local, corner), 1));
   }
   return box;
 }

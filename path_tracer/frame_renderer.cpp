@@ -59,13 +59,13 @@ std::string make_fingerprint(const RenderOptions& options, std::span<const fs::p
   return text;
 }
 
-Metadata frame_metadata(const RenderOptions& options, const Camera& camera, int frame) {
+Metadata frame_metadata(const RenderOptions& options, const GltfScene& scene, const Camera& camera, int frame) {
   const TessellationCamera pixel = camera.tessellation();
   return {
       {"camera.forward", camera.forward()},
       {"camera.pixel_spread", pixel.pixel_spread},
       {"camera.pixel_width", pixel.pixel_width},
-      {"camera.position", camera.position()},
+      {"camera.position", vec3(dvec3(camera.position()) + scene.origin)},
       {"camera.up", camera.up()},
       {"farfield.budget", fmt::format("{}", options.budget_bytes)},
       {"farfield.frame", frame},
@@ -78,9 +78,9 @@ Metadata frame_metadata(const RenderOptions& options, const Camera& camera, int 
 }
 
 // With ids: whose they are.
-Metadata frame_metadata(const RenderOptions& options, const Camera& camera, int frame,
+Metadata frame_metadata(const RenderOptions& options, const GltfScene& scene, const Camera& camera, int frame,
                         std::span<const GltfInstance> instances) {
-  Metadata metadata = frame_metadata(options, camera, frame);
+  Metadata metadata = frame_metadata(options, scene, camera, frame);
   if (!options.cryptomatte) return metadata;
   std::set<std::string> names;
   for (const GltfInstance& instance : instances) names.insert(object_name(instance));
@@ -175,7 +175,7 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     report.peak_accounted_bytes = std::max(report.peak_accounted_bytes, session->stats().peak_accounted_bytes);
     report.peak_rss_bytes = memory.peak_bytes();
     report.warnings = warnings_->lines();
-    const Metadata metadata = frame_metadata(options_, camera, frames[i], session_instances);
+    const Metadata metadata = frame_metadata(options_, scene_, camera, frames[i], session_instances);
     if (auto taken = sink(film.image(), metadata, report); !taken) return tl::unexpected(taken.error());
   }
   report.peak_rss_bytes = memory.peak_bytes();

@@ -40,6 +40,45 @@ std::string scene_file(const std::string& nodes, const std::string& roots, const
   return glb(json, triangle + extra);
 }
 
+TEST(GltfScene, MapCoordinatesKeepTheirDigits) {
+  const auto far = read_gltf_scene(kCases / "g24_utm.glb"), near = read_gltf_scene(kCases / "g24_origin.glb");
+  ASSERT_TRUE(far && near);
+  EXPECT_EQ(near->origin, dvec3(0.0));
+  EXPECT_NEAR(far->origin.z, 4500000.5, 1);
+  const auto seen = [](const GltfScene& scene) {
+    return scene.cameras.at(0).position - scene.instances.at(0).to_world[3];
+  };
+  EXPECT_LT(distance(seen(*far), seen(*near)), 1e-6f);
+  const auto seen_later = [](const GltfScene& scene) {
+    return scene.camera_at(0, 1).position - scene.instances_at(1).at(0).to_world[3];
+  };
+  EXPECT_LT(distance(seen_later(*far), seen_later(*near)), 1e-6f);
+  EXPECT_LT(distance(far->bounds_world().size(), near->bounds_world().size()), 1e-6f);
+}
+
+TEST(GltfScene, LightsOfMapCoordinatesMoveAlong) {
+  const TemporaryFolder folder;
+  const std::string light = R"("extensions":{"KHR_lights_punctual":{"lights":[{"type":"point"}]}})";
+  const auto scene = read_gltf_scene(folder.write("far.glb", scene_file(
+                                                                 R"({"mesh":0,"translation":[4500000,0,0]},
+         {"translation":[4500000,2.125,0],"extensions":{"KHR_lights_punctual":{"light":0}}})",
+                                                                 "0,1", light)));
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->lights.size(), 1u);
+  EXPECT_LT(distance(scene->lights[0].position - scene->instances[0].to_world[3], vec3(0, 2.125f, 0)), 1e-6f);
+}
+
+TEST(GltfScene, AMeshWhosePointsAreFarFromItsOriginIsWarnedAbout) {
+  const TemporaryFolder folder;
+  std::string file = scene_file(R"({"mesh":0})", "0", "", "",
+                                R"({"componentType":5126,"count":3,"type":"VEC3","min":[9e6,0,0],"max":[9e6,1,0]})");
+  const std::string near = R"("POSITION":0)", far = R"("POSITION":1)";
+  const auto scene = read_gltf_scene(folder.write("far.glb", file.replace(file.find(near), near.size(), far)));
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->warnings.size(), 1u);
+  EXPECT_NE(scene->warnings[0].find("mesh tri"), std::string::npos) << scene->warnings[0];
+}
+
 TEST(GltfScene, OneBrokenMeshIsLeftOutByName) {
   const TemporaryFolder folder;
   std::string file =
@@ -237,7 +276,7 @@ TEST(GltfScene, ChainOf5000NodesIsWalkedWithoutRecursion) {
   const auto scene = read_gltf_scene(folder.write("deep.glb", scene_file(nodes + R"({"mesh":0})", "0")));
   ASSERT_TRUE(scene) << scene.error().message;
   ASSERT_EQ(scene->instances.size(), 1u);
-  EXPECT_FLOAT_EQ(scene->instances[0].to_world[3].z, 2499.5f);
+  EXPECT_DOUBLE_EQ(scene->origin.z + static_cast<double>(scene->instances[0].to_world[3].z), 2499.5);
 }
 
 TEST(GltfScene, DeepJsonIsRefusedBeforeAnyRecursiveParser) {
