@@ -11,6 +11,7 @@
 
 #include "base/result.h"
 #include "import/gltf_document.h"
+#include "import/gltf_nodes.h"
 #include "import/read_file.h"
 
 namespace farfield {
@@ -128,7 +129,7 @@ vec3 corner_of(const Box3& box, int number) {
 
 /// Whether floats are so sparse where the box lies that the steps between them could be seen on what is in it.
 bool is_far_for_its_size(const dvec3& lower, const dvec3& upper) {
-  constexpr double kFarthestInSizes = 32;  // a 2^18th of its size is then the step of a float
+  constexpr double kFarthestInSizes = 16;  // a 2^19th of its size is then the step of a float
   return glm::length(0.5 * (lower + upper)) > kFarthestInSizes * glm::length(upper - lower);  // false for NaN
 }
 
@@ -348,22 +349,28 @@ class SceneReader {
 
   Result<void> place_everything(const std::vector<int>& order) {
     const std::vector<dmat4> world = world_matrices(scene_, 0);
+    const std::vector<bool> hidden = hidden_nodes(document_);
     for (uint32_t i = 0; i < order.size(); ++i) {
       const auto& node = model_.nodes[static_cast<size_t>(order[i])];
-      if (node.mesh >= 0) FARFIELD_TRY(add_instances(node, order[i], i, world[i]));
+      if (node.mesh >= 0 && !hidden[static_cast<size_t>(order[i])])
+        FARFIELD_TRY(add_instances(node, order[i], i, world));
     }
     place_instances();
     for (uint32_t i = 0; i < order.size(); ++i) {
       const auto& node = model_.nodes[static_cast<size_t>(order[i])];
       if (node.camera >= 0) add_camera(node, i, world[i]);
       const auto light = node.extensions.find("KHR_lights_punctual");
-      if (light != node.extensions.end()) add_light(node, light->second, i, world[i]);
+      if (light != node.extensions.end() && !hidden[static_cast<size_t>(order[i])])
+        add_light(node, light->second, i, world[i]);
     }
     return {};
   }
 
-  Result<void> add_instances(const tinygltf::Node& node, int number, uint32_t index, const dmat4& world) {
-    FARFIELD_TRY_LET(const auto transforms, instance_transforms(document_, node));
+  Result<void> add_instances(const tinygltf::Node& node, int number, uint32_t index, const std::vector<dmat4>& worlds) {
+    FARFIELD_TRY_LET(auto transforms, instance_transforms(document_, node));
+    if (node.skin >= 0) FARFIELD_TRY(move_to_skeleton(node, number, index, transforms));
+    if (has_weights_of_its_own(document_, node)) warn(fmt::format("node {} ({}): {}", number, node.name, kOwnWeights));
+    const dmat4& world = worlds[index];
     const auto first_seen = [&](const dmat4& in_node) -> std::optional<dmat4> {
       if (is_invertible(world * in_node)) return world * in_node;
       for (const double seconds : times_to_look_at(index)) {
@@ -387,6 +394,25 @@ class SceneReader {
     return {};
   }
 
+  /// A skinned mesh goes with a joint instead of with its node.
+  Result<void> move_to_skeleton(const tinygltf::Node& node, int number, uint32_t& index,
+                                std::vector<dmat4>& transforms) {
+    FARFIELD_TRY_LET(const auto place, skin_place(document_, node));
+    warn(fmt::format("node {} ({}): {}", number, node.name, place ? kSkinned : kBrokenSkin));
+    const int32_t joint = place ? scene_index_[static_cast<size_t>(place->joint)] : -1;
+    if (joint < 0) return {};  // or outside of the scene: it stands where its node is
+    index = static_cast<uint32_t>(joint);
+    for (dmat4& transform : transforms) transform = place->in_joint * transform;
+    return {};
+  }
+
+  bool moves(uint32_t node) const {
+    for (auto n = static_cast<int32_t>(node); n >= 0; n = scene_.nodes[static_cast<size_t>(n)].parent) {
+      if (!scene_.nodes[static_cast<size_t>(n)].channels.empty()) return true;
+    }
+    return false;
+  }
+
   /// Chooses the origin, the middle of all instances or zero, and puts them where they are from there.
   void place_instances() {
     dvec3 lower(INFINITY), upper(-INFINITY);
@@ -400,8 +426,9 @@ class SceneReader {
       }
     }
     const vec3 middle(0.5 * (lower + upper));  // a float, so that those who have floats can add it without loss
-    if (is_far_for_its_size(lower, upper) && is_finite(middle)) scene_.origin = dvec3(middle);
-    for (size_t i = 0; i < places_.size(); ++i) scene_.instances[i].to_world = to_affine(places_[i], scene_.origin);
+    if (is_far_for_its_size(lower, upper) && is_finite(middle)) scene_.origin_world = dvec3(middle);
+    for (size_t i = 0; i < places_.size(); ++i)
+      scene_.instances[i].to_world = to_affine(places_[i], scene_.origin_world);
   }
 
   /// The keys of a node and its ancestors, and the times halfway between them, in order.
@@ -444,7 +471,7 @@ class SceneReader {
     camera.half_height = std::abs(camera.half_height);
     if (!(camera.aspect > 0) || !std::isfinite(camera.aspect)) camera.aspect = 0;
     if (!(camera.z_near > 0) || !std::isfinite(camera.z_near)) camera.z_near = 0;
-    place(camera, world, scene_.origin);
+    place(camera, world, scene_.origin_world);
     scene_.cameras.push_back(std::move(camera));
   }
 
@@ -462,11 +489,12 @@ class SceneReader {
     light.name = node.name.empty() ? source.name : node.name;
     if (source.color.size() == 3) light.color = vec3(source.color[0], source.color[1], source.color[2]);
     light.intensity = static_cast<float>(source.intensity);
-    light.position = vec3(dvec3(world[3]) - scene_.origin);
+    light.position = vec3(dvec3(world[3]) - scene_.origin_world);
     light.direction = vec3(glm::normalize(-dvec3(world[2])));
     light.inner_cone_rad = static_cast<float>(source.spot.innerConeAngle);
     light.outer_cone_rad = static_cast<float>(source.spot.outerConeAngle);
     light.node = index;
+    if (moves(index)) warn(fmt::format("light {}: it is animated; it stays where it is at time 0", light.name));
     if (!is_finite(light.color) || !std::isfinite(light.intensity) || min_component(light.color) < 0 ||
         light.intensity < 0) {
       warn(fmt::format("light {}: colour or intensity is not usable; left out", light.name));
@@ -487,7 +515,7 @@ class SceneReader {
 
 GltfCamera GltfScene::camera_at(size_t index, double seconds) const {
   GltfCamera camera = cameras[index];
-  place(camera, world_matrix(*this, camera.node, seconds), origin);
+  place(camera, world_matrix(*this, camera.node, seconds), origin_world);
   return camera;
 }
 
@@ -498,7 +526,7 @@ std::vector<GltfInstance> GltfScene::instances_at(double seconds) const {
     const dmat4 to_world = world[instance.node] * to_square(instance.in_node);
     if (!is_invertible(to_world)) continue;
     placed.push_back(instance);
-    placed.back().to_world = to_affine(to_world, origin);
+    placed.back().to_world = to_affine(to_world, origin_world);
   }
   return placed;
 }
@@ -508,7 +536,11 @@ Box3 GltfScene::bounds_world() const {
   for (const GltfInstance& instance : instances) {
     const Box3& local = meshes[instance.mesh].bounds;
     if (local.is_empty()) continue;
-    for (int corner = 0; corner < 8; ++corner) box.extend(instance.to_world * vec4(corner_of(local, corner), 1));
+    for (int corner = 0; corner < 8; ++corner) {
+      const vec3 p((corner & 1 ? local.upper : local.lower).x, (corner & 2 ? local.upper : local.lower).y,
+                   (corner & 4 ? local.upper : local.lower).z);
+      box.extend(instance.to_world * vec4(p, 1));
+    }
   }
   return box;
 }

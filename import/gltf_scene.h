@@ -77,8 +77,11 @@ struct GltfNode {
   std::vector<uint32_t> channels;  ///< indices into GltfScene::channels
 };
 
-/// Immutable once read; thread-safe. World space is the file's, moved so that `origin` is its origin.
+/// Immutable once read; thread-safe. "World" is the file's, less `origin_world`.
 struct GltfScene {
+  /// Subtracted from all that stands in the world, in double precision: map coordinates leave a float no digits. The
+  /// middle of the scene if that lies far from 0 for its size, else 0.
+  dvec3 origin_world{0.0};
   std::vector<GltfMesh> meshes;  ///< all of the file, instanced or not
   /// Of the default scene, in the order of a depth-first walk: all that are to be seen at some time, where they stand
   /// at time 0 or, if their transform is singular then (a plant that grows from nothing), as soon as it is not.
@@ -87,9 +90,6 @@ struct GltfScene {
   std::vector<GltfLight> lights;    ///< of the default scene
   std::vector<GltfNode> nodes;      ///< of the default scene, flattened, parents first
   std::vector<GltfChannel> channels;
-  /// In the file's coordinates. Not zero for scenes that stand far from there for their size (map coordinates): floats
-  /// of their places would be coarser than what is seen, so this is subtracted in double precision first.
-  dvec3 origin{0.0};
   double start_seconds = 0, end_seconds = 0;  ///< first and last key of all animation; both 0 when nothing moves
   double frames_per_second = 24;              ///< of the keys where they are evenly spaced at a usual rate, else 24
   std::vector<std::string> warnings;          ///< one line each

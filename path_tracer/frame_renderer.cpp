@@ -65,7 +65,7 @@ Metadata frame_metadata(const RenderOptions& options, const GltfScene& scene, co
       {"camera.forward", camera.forward()},
       {"camera.pixel_spread", pixel.pixel_spread},
       {"camera.pixel_width", pixel.pixel_width},
-      {"camera.position", vec3(dvec3(camera.position()) + scene.origin)},
+      {"camera.position", vec3(dvec3(camera.position()) + scene.origin_world)},
       {"camera.up", camera.up()},
       {"farfield.budget", fmt::format("{}", options.budget_bytes)},
       {"farfield.frame", frame},
