@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstring>
 #include <optional>
@@ -89,7 +90,8 @@ std::vector<std::string> bake_command(const RenderOptions& options, size_t mesh,
                                       "--finest-grid",
                                       fmt::format("{}", options.finest_grid),
                                       "--threads",
-                                      fmt::format("{}", thread_count())};
+                                      fmt::format("{}", thread_count()),
+                                      "--quiet"};
   if (options.full_detail) command.push_back("--source-only");
   return command;
 }
@@ -102,25 +104,28 @@ BakeOptions bake_options(const RenderOptions& options, size_t mesh) {
   return bake;
 }
 
-// Says again what the bake said, since it is as true of this picture. True if there is nothing to bake.
-bool is_up_to_date(const RenderOptions& options, size_t mesh, const fs::path& folder) {
-  const auto manifest = find_up_to_date(options.scene, folder, bake_options(options, mesh));
-  if (manifest && options.warning) {
-    for (const std::string& warning : manifest->warnings)
-      options.warning(fmt::format("{}: {}", folder.filename().string(), warning));
-  }
-  return manifest.has_value();
+// What the bake said, which is as true of this picture as of the asset.
+void repeat_warnings(const GltfScene& scene, const RenderOptions& options, size_t mesh, const Manifest& manifest) {
+  if (!options.warning) return;
+  for (const std::string& warning : manifest.warnings)
+    options.warning(fmt::format("mesh {}: {}", scene.meshes[mesh].asset_name, warning));
 }
 
-Result<void> bake_mesh(const GltfScene& scene, const RenderOptions& options, size_t mesh, const fs::path& folder) {
+// How a bake ended.
+struct BakeEnd {
+  bool is_done = false;
+  std::string how;  // if not: "exit code 3"
+};
+
+Result<BakeEnd> bake_mesh(const RenderOptions& options, size_t mesh, const fs::path& folder) {
   FARFIELD_TRY_LET(const auto child, start(bake_command(options, mesh, folder)));
   FARFIELD_TRY_LET(const auto status, wait_for(child, options));
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return BakeEnd{true, {}};
   if (options.job.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
-  const std::string how = WIFSIGNALED(status) ? fmt::format("signal {}", WTERMSIG(status))
-                                              : fmt::format("exit code {}", WEXITSTATUS(status));
-  return make_error(ErrorCode::BadFile, fmt::format("{}: baking mesh {} \"{}\" failed ({})", options.scene.string(),
-                                                    mesh, scene.meshes[mesh].name, how));
+  if (WIFEXITED(status)) return BakeEnd{false, fmt::format("exit code {}", WEXITSTATUS(status))};
+  // Killed from outside or out of memory: no fault of the mesh.
+  return make_error(ErrorCode::BadFile, fmt::format("{}: baking mesh {} failed (signal {})", options.scene.string(),
+                                                    mesh, WTERMSIG(status)));
 }
 
 std::vector<bool> meshes_in_use(const GltfScene& scene) {
@@ -148,12 +153,29 @@ Result<std::vector<fs::path>> find_or_bake_assets(const GltfScene& scene, const 
 
   const std::vector<bool> in_use = meshes_in_use(scene);
   std::vector<fs::path> folders(scene.meshes.size());
+  std::string broken;  // the first
   for (size_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {
     if (!in_use[mesh]) continue;
     const char* suffix = options.full_detail ? ".source.farfield" : ".farfield";
-    folders[mesh] = library / (scene.meshes[mesh].asset_name + suffix);
-    if (is_up_to_date(options, mesh, folders[mesh])) continue;
-    FARFIELD_TRY(bake_mesh(scene, options, mesh, folders[mesh]));
+    const fs::path folder = library / (scene.meshes[mesh].asset_name + suffix);
+    if (const auto manifest = find_up_to_date(options.scene, folder, bake_options(options, mesh))) {
+      repeat_warnings(scene, options, mesh, *manifest);
+      folders[mesh] = folder;
+      continue;
+    }
+    FARFIELD_TRY_LET(const auto end, bake_mesh(options, mesh, folder));
+    if (end.is_done) {
+      if (const auto manifest = read_manifest(folder)) repeat_warnings(scene, options, mesh, *manifest);
+      folders[mesh] = folder;
+      continue;
+    }
+    const std::string said = fmt::format("baking mesh {} \"{}\" failed ({})", mesh, scene.meshes[mesh].name, end.how);
+    if (broken.empty()) broken = said;
+    if (options.warning) options.warning(said + "; it is left out");
+  }
+  if (!broken.empty() && std::ranges::all_of(folders, &fs::path::empty)) {
+    return make_error(ErrorCode::BadFile,
+                      fmt::format("{}: {}, and nothing is left to show", options.scene.string(), broken));
   }
   return folders;
 }

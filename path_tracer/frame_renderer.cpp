@@ -115,17 +115,21 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOption
                                                               options.width, options.height, kLargestSide));
   std::unique_ptr<FrameRenderer> renderer(new FrameRenderer);
   renderer->options_ = options;
+  renderer->options_.warning = [&said = renderer->warnings_, print = options.warning](const std::string& line) {
+    if (said.add(line) && print) print(line);
+  };
+  const auto& warn = renderer->options_.warning;
 
   FARFIELD_TRY_LET(auto scene, read_gltf_scene(options.scene));
   FARFIELD_TRY_LET(const auto camera, find_camera(scene, options.camera));
   renderer->camera_ = camera;
   if (options.frames_per_second > 0) scene.frames_per_second = options.frames_per_second;
-  std::vector<std::string> warnings = scene.warnings;
-  FARFIELD_TRY_LET(auto lights, make_lights(scene, options, warnings));
-  if (options.warning)
-    for (const std::string& warning : warnings) options.warning(warning);
+  for (const std::string& warning : scene.warnings) warn(warning);  // before an error may come
+  std::vector<std::string> of_lights;
+  FARFIELD_TRY_LET(auto lights, make_lights(scene, options, of_lights));
+  for (const std::string& warning : of_lights) warn(warning);
 
-  FARFIELD_TRY_LET(auto folders, find_or_bake_assets(scene, options));
+  FARFIELD_TRY_LET(auto folders, find_or_bake_assets(scene, renderer->options_));
   for (size_t mesh = 0; mesh < folders.size(); ++mesh)
     if (!folders[mesh].empty()) renderer->asset_names_.push_back(scene.meshes[mesh].asset_name);
   renderer->fingerprint_ = make_fingerprint(options, folders);
@@ -173,9 +177,11 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     report.peak_accounted_bytes = std::max(report.peak_accounted_bytes, session->stats().peak_accounted_bytes);
     report.peak_rss_bytes = memory.peak_bytes();
     const Metadata metadata = frame_metadata(options_, camera, frames[i], session_instances);
+    report.warnings = warnings_.lines();
     if (auto taken = sink(film.image(), metadata, report); !taken) return tl::unexpected(taken.error());
   }
   report.peak_rss_bytes = memory.peak_bytes();
+  report.warnings = warnings_.lines();
   return report;
 }
 

@@ -15,9 +15,10 @@ struct ShotRecord {
   RenderReport report;
 };
 
-/// {"budget_bytes", "baseline_rss_bytes", "peak_rss_bytes", "peak_accounted_bytes", "fingerprint", "assets": [...],
-/// "frames": [{"frame", "seconds", "load_seconds", "accounted_bytes", "rss_bytes", "bias", "rays", "levels_loaded",
-/// "fallbacks", "invalid_samples", "finest_level": {asset: k}}]}, indented, keys in this order, frames ascending.
+/// {"budget_bytes", "baseline_rss_bytes", "peak_rss_bytes", "peak_accounted_bytes", "fingerprint", "warnings": [...],
+/// "assets": [...], "frames": [{"frame", "seconds", "load_seconds", "accounted_bytes", "rss_bytes", "bias", "rays",
+/// "levels_loaded", "fallbacks", "invalid_samples", "finest_level": {asset: k}}]}, indented, keys in this order, frames
+/// ascending.
 std::string to_json(const ShotRecord& record);
 
 /// Reads what to_json wrote; nothing for any other text.

@@ -22,8 +22,8 @@ struct RenderArguments {
 void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::string& output_help);
 
 /// Runs `job` with the parsed options, progress on a terminal, and Ctrl-C; prints messages of the job when a person
-/// reads them.
-Result<RenderReport> run_with_progress(RenderArguments& arguments,
+/// reads them, and warnings in the name of `command`.
+Result<RenderReport> run_with_progress(const char* command, RenderArguments& arguments,
                                        const std::function<Result<RenderReport>(const RenderOptions&)>& job);
 
 }  // namespace farfield::tool

@@ -260,6 +260,15 @@ TEST_F(Shot, WithoutSkyItIsDark) {
     for (int c = 0; c < 3; ++c) EXPECT_EQ(file->image.pixel(x, 16)[c], 0.0f);
 }
 
+TEST_F(Shot, WarningsAreSaidOnceAndKeptInTheRecord) {
+  options_.sky = false;
+  std::vector<std::string> warnings;
+  options_.warning = [&](const std::string& line) { warnings.push_back(line); };
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(record()["warnings"], nlohmann::json::array({warnings[0]}));
+}
+
 TEST_F(Shot, CancelKeepsFinishedFramesAndTheRecord) {
   std::atomic<bool> cancel{false};
   options_.job.cancel = &cancel;

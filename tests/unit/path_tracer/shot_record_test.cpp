@@ -30,6 +30,7 @@ ShotRecord sample_record() {
   record.report.baseline_rss_bytes = 100;
   record.report.peak_rss_bytes = 180;
   record.report.peak_accounted_bytes = 70;
+  record.report.warnings = {"mesh maple: a texture is missing"};
   record.report.frames = {frame_report(0), frame_report(10)};
   return record;
 }
@@ -40,6 +41,7 @@ TEST(ShotRecord, HasTheKeysThatChecksRead) {
   EXPECT_EQ(json["baseline_rss_bytes"], 100);
   EXPECT_EQ(json["peak_rss_bytes"], 180);
   EXPECT_EQ(json["peak_accounted_bytes"], 70);
+  EXPECT_EQ(json["warnings"], nlohmann::json::array({"mesh maple: a texture is missing"}));
   ASSERT_EQ(json["frames"].size(), 2u);
   const auto& frame = json["frames"][1];
   EXPECT_EQ(frame["frame"], 10);
@@ -84,6 +86,13 @@ TEST(JoinReports, NothingJoinsWithSomethingToThatThing) {
   const RenderReport report = sample_record().report;
   EXPECT_EQ(to_json({"", join_reports({}, report)}), to_json({"", report}));
   EXPECT_EQ(to_json({"", join_reports(report, {})}), to_json({"", report}));
+}
+
+TEST(ShotRecord, RunsThatSayTheSameSayItOnce) {
+  RenderReport earlier = sample_record().report, later = earlier;
+  later.warnings.push_back("mesh ground: black");
+  const RenderReport joined = join_reports(earlier, later);
+  EXPECT_EQ(joined.warnings, later.warnings);
 }
 
 }  // namespace
