@@ -110,9 +110,9 @@ void warn(const RenderOptions& options, const std::string& line) {
 }
 
 // What a bake warned of is as true of the picture, now and at each later run.
-void repeat_warnings(const RenderOptions& options, const fs::path& folder, const Manifest& manifest) {
+void repeat_warnings(const RenderOptions& options, const GltfMesh& mesh, const Manifest& manifest) {
   for (const std::string& warning : manifest.warnings)
-    warn(options, fmt::format("{}: {}", folder.filename().string(), warning));
+    warn(options, fmt::format("mesh {}: {}", mesh.asset_name, warning));
 }
 
 // Errors: Unsupported, when it is the mesh that cannot be baked and others may; else Io, BadFile, Cancelled.
@@ -133,11 +133,11 @@ Result<void> bake_mesh(const GltfScene& scene, const RenderOptions& options, siz
 Result<void> find_or_bake(const GltfScene& scene, const RenderOptions& options, size_t mesh, const fs::path& folder,
                           FileHashes& hashes) {
   if (const auto found = find_up_to_date(options.scene, folder, bake_options(options, mesh, hashes))) {
-    repeat_warnings(options, folder, *found);
+    repeat_warnings(options, scene.meshes[mesh], *found);
     return {};
   }
   FARFIELD_TRY(bake_mesh(scene, options, mesh, folder));
-  if (const auto baked = read_manifest(folder)) repeat_warnings(options, folder, *baked);
+  if (const auto baked = read_manifest(folder)) repeat_warnings(options, scene.meshes[mesh], *baked);
   return {};
 }
 

@@ -120,12 +120,13 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOption
   const RenderOptions& options = renderer->options_;
 
   FARFIELD_TRY_LET(auto scene, read_gltf_scene(options.scene));
+  for (const std::string& warning : scene.warnings) options.warning(warning);  // before an error may come
   FARFIELD_TRY_LET(const auto camera, find_camera(scene, options.camera));
   renderer->camera_ = camera;
   if (options.frames_per_second > 0) scene.frames_per_second = options.frames_per_second;
-  std::vector<std::string> warnings = scene.warnings;
-  FARFIELD_TRY_LET(auto lights, make_lights(scene, options, warnings));
-  for (const std::string& warning : warnings) options.warning(warning);
+  std::vector<std::string> of_lights;
+  FARFIELD_TRY_LET(auto lights, make_lights(scene, options, of_lights));
+  for (const std::string& warning : of_lights) options.warning(warning);
 
   FARFIELD_TRY_LET(auto folders, find_or_bake_assets(scene, options));
   for (size_t mesh = 0; mesh < folders.size(); ++mesh)
