@@ -282,6 +282,11 @@ class Package(unittest.TestCase):
         self.assertEqual({node.name for node in query.body if isinstance(node, ast.FunctionDef)},
                          {name for name in vars(_farfield.MaterialQuery) if name[0] != "_"})
 
+    def test_the_page_shows_the_example_that_is_run(self):
+        repository = Path(__file__).parents[2]
+        example = (repository / "samples/bake_from_numpy/bake_from_numpy.py").read_text().partition("\n")[2]
+        self.assertIn(f"```python\n{example}```\n", (repository / "docs/bake_api.md").read_text())
+
     def test_everything_is_documented(self):
         for name in farfield.__all__:
             self.assertTrue(inspect.getdoc(getattr(farfield, name)), name)
