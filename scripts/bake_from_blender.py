@@ -77,8 +77,8 @@ class MaterialReader:
                 self.ignored(name)
         return self.out
 
-    def ignored(self, what):
-        warn(f"material {self.name}: {what} is not read")
+    def ignored(self, what, instead=""):
+        warn(f"material {self.name}: {what} is not read{instead and '; '}{instead}")
 
     def find_principled(self):
         nodes = self.material.node_tree.nodes if self.material.use_nodes else []
@@ -87,7 +87,7 @@ class MaterialReader:
         if link and link.from_node.type == "BSDF_PRINCIPLED":
             return link.from_node
         if link:
-            self.ignored(f"a {link.from_node.bl_label} at the output; its viewport colour stands alone")
+            self.ignored(f"a {link.from_node.bl_label} at the output", "its viewport colour stands alone")
         return None
 
     def value(self, name):
@@ -105,7 +105,7 @@ class MaterialReader:
             behind = node.inputs[0].links
             node, output = (behind[0].from_node, behind[0].from_socket) if behind else (node, output)
         if node.type != "TEX_IMAGE" or node.image is None:
-            self.ignored(f"the {node.bl_label} at {name}; the plain value stands alone")
+            self.ignored(f"the {node.bl_label} at {name}", "the plain value stands alone")
             return None
         if output.name == "Alpha":
             channel = 3
@@ -113,7 +113,7 @@ class MaterialReader:
         if feeds and feeds[0].from_socket.name != "UV":
             self.ignored(f"the {feeds[0].from_node.bl_label} before the image {node.image.name}")
         if node.extension == "CLIP":
-            self.ignored(f"Clip of the image {node.image.name}; its border goes on")
+            self.ignored(f"Clip of the image {node.image.name}", "its border goes on")
         return node, channel
 
     def pixels(self, image):
