@@ -9,6 +9,8 @@ import zlib
 
 import numpy as np
 
+from make_textured_scenes import png
+
 CAMERAS = ("close", "middle", "far")
 
 
@@ -47,18 +49,6 @@ def read_png(path):
                 guess = np.where((a <= b) & (a <= c), left, np.where(b <= c, up, corner))
             rows[y + 1, x + 1] = (line[x] + guess) & 255
     return rows[1:, 1:, :3].astype(np.uint8)
-
-
-def write_png(path, image):
-    height, width, _ = image.shape
-    rows = np.concatenate([np.zeros((height, 1), np.uint8), image.reshape(height, width * 3)], 1)
-
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    with open(path, "wb") as out:
-        out.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)))
-        out.write(chunk(b"IDAT", zlib.compress(rows.tobytes(), 9)) + chunk(b"IEND", b""))
 
 
 def linear(image):
@@ -120,7 +110,8 @@ def main():
         level_table(folder, name)
         rows = frame_table(folder, name)
         sheet += [np.concatenate([rows[i] for i in (0, 2, 4)], 1), np.concatenate([rows[i] for i in (1, 3, 5)], 1)]
-    write_png("docs/results/textures.png", np.concatenate(sheet, 0)[::2, ::2])
+    with open("docs/results/textures.png", "wb") as out:
+        out.write(png(np.ascontiguousarray(np.concatenate(sheet, 0)[::2, ::2])))
     print("![each asset: full detail above, levels below](textures.png)\n\nEach asset from close up, mid-way and far: full detail above, "
           "levels below.")
 

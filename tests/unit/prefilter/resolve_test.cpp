@@ -9,18 +9,13 @@
 
 #include "base/index.h"
 #include "prefilter/face_materials.h"
+#include "tests/support/images.h"
 #include "tests/support/source_surfaces.h"
 
 namespace farfield {
 namespace {
 
-std::shared_ptr<const Texture> image(int side, const std::function<vec4(int, int)>& texel) {
-  std::vector<vec4> texels;
-  for (int y = 0; y < side; ++y) {
-    for (int x = 0; x < side; ++x) texels.push_back(texel(x, y));
-  }
-  return std::make_shared<const Texture>(side, side, texels);
-}
+using test::image;
 
 /// The unit square as two triangles, texture coordinates (x, y).
 SourceSurface square() {

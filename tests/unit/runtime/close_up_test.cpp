@@ -7,20 +7,15 @@
 
 #include "bake/bake.h"
 #include "tests/support/files.h"
+#include "tests/support/images.h"
 #include "tests/support/runtime_host.h"
 
 namespace farfield {
 namespace {
 
-namespace fs = std::filesystem;
+using test::image;
 
-std::shared_ptr<const Texture> image(int side, const std::function<vec4(int, int)>& texel) {
-  std::vector<vec4> texels;
-  for (int y = 0; y < side; ++y) {
-    for (int x = 0; x < side; ++x) texels.push_back(texel(x, y));
-  }
-  return std::make_shared<const Texture>(side, side, texels);
-}
+namespace fs = std::filesystem;
 
 /// The square [0, 1]^2 in the plane z = 0, one polygon, texture coordinates (x, y).
 SourceMesh square() {
