@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <glm/gtc/type_ptr.hpp>
 #include <set>
 
 #include "base/hash.h"
@@ -33,6 +32,7 @@ constexpr std::string_view kKnownExtensions[] = {"EXT_mesh_gpu_instancing",
                                                  "KHR_materials_transmission",
                                                  "KHR_materials_unlit",
                                                  "KHR_mesh_quantization",
+                                                 "KHR_node_visibility",
                                                  "KHR_texture_transform"};
 
 /// File access for tinygltf: only regular files in or relative to the document's folder, with our size limit, hashed.
@@ -164,6 +164,13 @@ Result<void> check_meshes(const GltfDocument& document) {
           return document.bad(fmt::format("{}: no such accessor for {}", place, name));
         }
       }
+      for (const auto& target : primitive.targets) {
+        for (const auto& [name, accessor] : target) {
+          if (!is_index(accessor, model.accessors)) {
+            return document.bad(fmt::format("{}: no such accessor for the morph target of {}", place, name));
+          }
+        }
+      }
     }
   }
   return {};
@@ -177,10 +184,26 @@ Result<void> check_textures(const GltfDocument& document) {
     }
   }
   for (size_t m = 0; m < model.materials.size(); ++m) {
-    const auto& pbr = model.materials[m].pbrMetallicRoughness;
+    const auto& material = model.materials[m];
+    const auto& pbr = material.pbrMetallicRoughness;
     if (!is_index(pbr.baseColorTexture.index, model.textures) ||
-        !is_index(pbr.metallicRoughnessTexture.index, model.textures)) {
+        !is_index(pbr.metallicRoughnessTexture.index, model.textures) ||
+        !is_index(material.normalTexture.index, model.textures) ||
+        !is_index(material.emissiveTexture.index, model.textures)) {
       return document.bad(fmt::format("material {}: no such texture", m));
+    }
+  }
+  return {};
+}
+
+Result<void> check_skins(const GltfDocument& document) {
+  const Model& model = document.model;
+  for (size_t s = 0; s < model.skins.size(); ++s) {
+    const auto& skin = model.skins[s];
+    const auto is_node = [&](int n) { return n >= 0 && is_index(n, model.nodes); };
+    if (!is_index(skin.inverseBindMatrices, model.accessors) || skin.joints.empty() ||
+        !std::all_of(skin.joints.begin(), skin.joints.end(), is_node)) {
+      return document.bad(fmt::format("skin {}: no joints, or no such node or accessor", s));
     }
   }
   return {};
@@ -193,8 +216,9 @@ Result<void> check_nodes(const GltfDocument& document) {
   std::vector<int> parent(model.nodes.size(), -1);
   for (int n = 0; n < count; ++n) {
     const auto& node = model.nodes[static_cast<size_t>(n)];
-    if (!is_index(node.mesh, model.meshes) || !is_index(node.camera, model.cameras)) {
-      return document.bad(fmt::format("node {}: no such mesh or camera", n));
+    if (!is_index(node.mesh, model.meshes) || !is_index(node.camera, model.cameras) ||
+        !is_index(node.skin, model.skins)) {
+      return document.bad(fmt::format("node {}: no such mesh, camera or skin", n));
     }
     for (const int child : node.children) {
       if (child < 0 || child >= count) return document.bad(fmt::format("node {}: no such child {}", n, child));
@@ -312,12 +336,6 @@ Result<void> apply_sparse(const GltfDocument& document, const tinygltf::Accessor
   return {};
 }
 
-/// Zero and NaN quaternions become the identity.
-glm::dvec4 unit_quaternion(const glm::dvec4& q) {
-  const double length = glm::length(q);
-  return length > 0 && std::isfinite(length) ? q / length : glm::dvec4(0, 0, 0, 1);
-}
-
 uint64_t total_buffer_bytes(const Model& model) {
   uint64_t bytes = 0;
   for (const auto& buffer : model.buffers) bytes += buffer.data.size();
@@ -364,7 +382,7 @@ Result<GltfDocument> open_gltf(std::span<const unsigned char> bytes, const fs::p
   document.files = std::move(access.files);
   document.warnings = warn_of_unknown_extensions(document.model);
 
-  for (const auto check : {check_meshes, check_textures, check_nodes}) {
+  for (const auto check : {check_meshes, check_textures, check_skins, check_nodes}) {
     if (auto good = check(document); !good) return tl::unexpected(good.error());
   }
   return document;
@@ -438,121 +456,6 @@ Result<std::vector<unsigned char>> image_bytes(const GltfDocument& document, int
                       fmt::format("{}: image {} ({}) is missing", document.name, index, image.uri));
   }
   return image.image;
-}
-
-std::vector<int> parents(const Model& model) {
-  std::vector<int> parent(model.nodes.size(), -1);
-  for (size_t n = 0; n < model.nodes.size(); ++n) {
-    for (const int child : model.nodes[n].children) parent[static_cast<size_t>(child)] = static_cast<int>(n);
-  }
-  return parent;
-}
-
-std::vector<int> scene_nodes(const GltfDocument& document) {
-  const Model& model = document.model;
-  std::vector<int> roots;
-  if (model.scenes.empty()) {
-    const std::vector<int> parent = parents(model);
-    for (size_t n = 0; n < parent.size(); ++n) {
-      if (parent[n] < 0) roots.push_back(static_cast<int>(n));
-    }
-  } else {
-    const size_t scene = model.defaultScene >= 0 && is_index(model.defaultScene, model.scenes)
-                             ? static_cast<size_t>(model.defaultScene)
-                             : 0;
-    roots = model.scenes[scene].nodes;
-  }
-  // A scene might list a node twice: it is shown once.
-  std::vector<bool> seen(model.nodes.size());
-  std::vector<int> order, stack(roots.rbegin(), roots.rend());
-  while (!stack.empty()) {
-    const int n = stack.back();
-    stack.pop_back();
-    if (seen[static_cast<size_t>(n)]) continue;
-    seen[static_cast<size_t>(n)] = true;
-    order.push_back(n);
-    const auto& children = model.nodes[static_cast<size_t>(n)].children;
-    stack.insert(stack.end(), children.rbegin(), children.rend());
-  }
-  return order;
-}
-
-NodeTransform transform_of(const tinygltf::Node& node) {
-  NodeTransform out;
-  if (node.matrix.size() == 16) {
-    out.has_matrix = true;
-    for (int i = 0; i < 16; ++i) out.matrix[i / 4][i % 4] = node.matrix[static_cast<size_t>(i)];
-    return out;
-  }
-  if (node.translation.size() == 3) out.translation = {node.translation[0], node.translation[1], node.translation[2]};
-  if (node.scale.size() == 3) out.scale = {node.scale[0], node.scale[1], node.scale[2]};
-  if (node.rotation.size() == 4) {
-    out.rotation = unit_quaternion({node.rotation[0], node.rotation[1], node.rotation[2], node.rotation[3]});
-  }
-  return out;
-}
-
-glm::dmat4 to_matrix(const NodeTransform& transform) {
-  if (transform.has_matrix) return transform.matrix;
-  const glm::dvec4& q = transform.rotation;
-  const double x = q.x, y = q.y, z = q.z, w = q.w;
-  glm::dmat4 m(1.0);
-  m[0] = transform.scale.x * glm::dvec4(1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w), 0);
-  m[1] = transform.scale.y * glm::dvec4(2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w), 0);
-  m[2] = transform.scale.z * glm::dvec4(2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y), 0);
-  m[3] = glm::dvec4(transform.translation, 1);
-  return m;
-}
-
-Result<std::vector<glm::dmat4>> instance_transforms(const GltfDocument& document, const tinygltf::Node& node) {
-  const auto extension = node.extensions.find("EXT_mesh_gpu_instancing");
-  if (extension == node.extensions.end()) return std::vector<glm::dmat4>{glm::dmat4(1.0)};
-  const auto place = fmt::format("node {} (EXT_mesh_gpu_instancing)", node.name);
-  const tinygltf::Value none,
-      &attributes = extension->second.Has("attributes") ? extension->second.Get("attributes") : none;
-
-  // Empty when the file does not give the attribute.
-  const auto read = [&](const char* name, int components) -> Result<std::vector<double>> {
-    if (!attributes.IsObject() || !attributes.Has(name)) return std::vector<double>();
-    const double index = extension_number(attributes, name).value_or(-1);
-    if (!(index >= 0 && index < static_cast<double>(document.model.accessors.size()))) {
-      return document.bad(fmt::format("{}: no such accessor for {}", place, name));
-    }
-    return read_accessor(document, static_cast<int>(index), components);
-  };
-  FARFIELD_TRY_LET(const auto translations, read("TRANSLATION", 3));
-  FARFIELD_TRY_LET(const auto rotations, read("ROTATION", 4));
-  FARFIELD_TRY_LET(const auto scales, read("SCALE", 3));
-
-  const size_t count = std::max({translations.size() / 3, rotations.size() / 4, scales.size() / 3});
-  const auto fits = [count](const std::vector<double>& values, size_t components) {
-    return values.empty() || values.size() == count * components;
-  };
-  if (!fits(translations, 3) || !fits(rotations, 4) || !fits(scales, 3)) {
-    return document.bad(place + ": TRANSLATION, ROTATION and SCALE differ in length");
-  }
-  std::vector<glm::dmat4> transforms;
-  transforms.reserve(count);
-  for (size_t i = 0; i < count; ++i) {
-    NodeTransform transform;
-    if (!translations.empty()) transform.translation = glm::make_vec3(&translations[3 * i]);
-    if (!scales.empty()) transform.scale = glm::make_vec3(&scales[3 * i]);
-    if (!rotations.empty()) transform.rotation = unit_quaternion(glm::make_vec4(&rotations[4 * i]));
-    transforms.push_back(to_matrix(transform));
-  }
-  return transforms;
-}
-
-bool is_invertible(const glm::dmat4& m) {
-  for (int c = 0; c < 4; ++c) {
-    for (int r = 0; r < 4; ++r) {
-      if (!std::isfinite(m[c][r])) return false;
-    }
-  }
-  const dvec3 x(m[0]), y(m[1]), z(m[2]);
-  const double volume = std::abs(glm::dot(x, glm::cross(y, z)));
-  // Relative to the box that the columns could span: a flat or collapsed transform loses all digits of it.
-  return volume > 1e-9 * glm::length(x) * glm::length(y) * glm::length(z);
 }
 
 std::optional<double> extension_number(const tinygltf::Value& object, const char* key) {

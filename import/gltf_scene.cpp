@@ -11,6 +11,7 @@
 
 #include "base/result.h"
 #include "import/gltf_document.h"
+#include "import/gltf_nodes.h"
 #include "import/read_file.h"
 
 namespace farfield {
@@ -116,11 +117,26 @@ dmat4 world_matrix(const GltfScene& scene, uint32_t node, double seconds) {
 
 dmat4 to_square(const mat4x3& m) { return dmat4(dvec4(m[0], 0), dvec4(m[1], 0), dvec4(m[2], 0), dvec4(m[3], 1)); }
 
-mat4x3 to_affine(const dmat4& m) { return mat4x3(vec3(m[0]), vec3(m[1]), vec3(m[2]), vec3(m[3])); }
+/// In floats, seen from `origin`.
+mat4x3 to_affine(const dmat4& m, const dvec3& origin = dvec3(0.0)) {
+  return mat4x3(vec3(m[0]), vec3(m[1]), vec3(m[2]), vec3(dvec3(m[3]) - origin));
+}
 
-/// Puts a camera where its node is. Scales, mirrors and shears are taken out: forward stays, up is made upright to it.
-void place(GltfCamera& camera, const dmat4& world) {
-  camera.position = vec3(world[3]);
+vec3 corner_of(const Box3& box, int number) {
+  return vec3((number & 1 ? box.upper : box.lower).x, (number & 2 ? box.upper : box.lower).y,
+              (number & 4 ? box.upper : box.lower).z);
+}
+
+/// Whether floats are so sparse where the box lies that the steps between them could be seen on what is in it.
+bool is_far_for_its_size(const dvec3& lower, const dvec3& upper) {
+  constexpr double kFarthestInSizes = 16;  // a 2^19th of its size is then the step of a float
+  return glm::length(0.5 * (lower + upper)) > kFarthestInSizes * glm::length(upper - lower);  // false for NaN
+}
+
+/// Puts a camera where its node is, seen from `origin`. Scales, mirrors and shears are taken out: forward stays, up is
+/// made upright to it.
+void place(GltfCamera& camera, const dmat4& world, const dvec3& origin) {
+  camera.position = vec3(dvec3(world[3]) - origin);
   const dvec3 forward = -dvec3(world[2]), up(world[1]);
   if (glm::length(glm::cross(forward, up)) <= 1e-12 * glm::length(forward) * glm::length(up)) return;
   camera.forward = vec3(glm::normalize(forward));
@@ -136,9 +152,7 @@ class SceneReader {
 
   Result<GltfScene> read() {
     scene_.warnings = document_.warnings;
-    for (size_t m = 0; m < model_.meshes.size(); ++m) {
-      FARFIELD_TRY(read_mesh(m));
-    }
+    for (size_t m = 0; m < model_.meshes.size(); ++m) scene_.meshes.push_back(read_mesh_or_nothing(m));
     const std::vector<int> order = scene_nodes(document_);
     flatten_nodes(order);
     for (const auto& animation : model_.animations) {
@@ -152,11 +166,21 @@ class SceneReader {
  private:
   void warn(std::string text) { scene_.warnings.push_back(std::move(text)); }
 
-  Result<void> read_mesh(size_t index) {
-    const auto& source = model_.meshes[index];
+  /// One broken mesh does not stop a scene: it stays empty, and is warned about.
+  GltfMesh read_mesh_or_nothing(size_t index) {
     GltfMesh mesh;
-    mesh.name = source.name;
-    mesh.asset_name = unique_name(source.name, index);
+    mesh.name = model_.meshes[index].name;
+    mesh.asset_name = unique_name(mesh.name, index);
+    if (const auto measured = measure(model_.meshes[index], mesh); !measured) {
+      warn(fmt::format("mesh {} ({}) is left out: {}", index, mesh.name, measured.error().message));
+      mesh.bounds = Box3();
+      mesh.triangle_count = 0;
+    }
+    return mesh;
+  }
+
+  /// Counts the triangles and finds the bounds.
+  Result<void> measure(const tinygltf::Mesh& source, GltfMesh& mesh) {
     for (const auto& primitive : source.primitives) {
       const auto position = primitive.attributes.find("POSITION");
       if (position == primitive.attributes.end()) continue;
@@ -168,7 +192,9 @@ class SceneReader {
       FARFIELD_TRY_LET(auto box, position_bounds(position->second));
       mesh.bounds.extend(box);
     }
-    scene_.meshes.push_back(std::move(mesh));
+    if (is_far_for_its_size(dvec3(mesh.bounds.lower), dvec3(mesh.bounds.upper)))
+      warn(fmt::format("mesh {}: its points lie so far from its origin that they are coarse; move its node instead",
+                       mesh.asset_name));
     return {};
   }
 
@@ -323,18 +349,28 @@ class SceneReader {
 
   Result<void> place_everything(const std::vector<int>& order) {
     const std::vector<dmat4> world = world_matrices(scene_, 0);
+    const std::vector<bool> hidden = hidden_nodes(document_);
     for (uint32_t i = 0; i < order.size(); ++i) {
       const auto& node = model_.nodes[static_cast<size_t>(order[i])];
-      if (node.mesh >= 0) FARFIELD_TRY(add_instances(node, order[i], i, world[i]));
+      if (node.mesh >= 0 && !hidden[static_cast<size_t>(order[i])])
+        FARFIELD_TRY(add_instances(node, order[i], i, world));
+    }
+    place_instances();
+    for (uint32_t i = 0; i < order.size(); ++i) {
+      const auto& node = model_.nodes[static_cast<size_t>(order[i])];
       if (node.camera >= 0) add_camera(node, i, world[i]);
       const auto light = node.extensions.find("KHR_lights_punctual");
-      if (light != node.extensions.end()) add_light(node, light->second, i, world[i]);
+      if (light != node.extensions.end() && !hidden[static_cast<size_t>(order[i])])
+        add_light(node, light->second, i, world[i]);
     }
     return {};
   }
 
-  Result<void> add_instances(const tinygltf::Node& node, int number, uint32_t index, const dmat4& world) {
-    FARFIELD_TRY_LET(const auto transforms, instance_transforms(document_, node));
+  Result<void> add_instances(const tinygltf::Node& node, int number, uint32_t index, const std::vector<dmat4>& worlds) {
+    FARFIELD_TRY_LET(auto transforms, instance_transforms(document_, node));
+    if (node.skin >= 0) FARFIELD_TRY(move_to_skeleton(node, number, index, transforms));
+    if (has_weights_of_its_own(document_, node)) warn(fmt::format("node {} ({}): {}", number, node.name, kOwnWeights));
+    const dmat4& world = worlds[index];
     const auto first_seen = [&](const dmat4& in_node) -> std::optional<dmat4> {
       if (is_invertible(world * in_node)) return world * in_node;
       for (const double seconds : times_to_look_at(index)) {
@@ -348,13 +384,51 @@ class SceneReader {
       const mat4x3 in_node = to_affine(transform);
       const auto seen = first_seen(to_square(in_node));
       if (seen) {
-        scene_.instances.push_back({static_cast<uint32_t>(node.mesh), to_affine(*seen), node.name, index, in_node});
+        scene_.instances.push_back({static_cast<uint32_t>(node.mesh), mat4x3(1), node.name, index, in_node});
+        places_.push_back(*seen);
       } else {
         ++singular;
       }
     }
     if (singular > 0) warn(fmt::format("node {} ({}): its transform is singular; left out", number, node.name));
     return {};
+  }
+
+  /// A skinned mesh goes with a joint instead of with its node.
+  Result<void> move_to_skeleton(const tinygltf::Node& node, int number, uint32_t& index,
+                                std::vector<dmat4>& transforms) {
+    FARFIELD_TRY_LET(const auto place, skin_place(document_, node));
+    warn(fmt::format("node {} ({}): {}", number, node.name, place ? kSkinned : kBrokenSkin));
+    const int32_t joint = place ? scene_index_[static_cast<size_t>(place->joint)] : -1;
+    if (joint < 0) return {};  // or outside of the scene: it stands where its node is
+    index = static_cast<uint32_t>(joint);
+    for (dmat4& transform : transforms) transform = place->in_joint * transform;
+    return {};
+  }
+
+  bool moves(uint32_t node) const {
+    for (auto n = static_cast<int32_t>(node); n >= 0; n = scene_.nodes[static_cast<size_t>(n)].parent) {
+      if (!scene_.nodes[static_cast<size_t>(n)].channels.empty()) return true;
+    }
+    return false;
+  }
+
+  /// Chooses the origin, the middle of all instances or zero, and puts them where they are from there.
+  void place_instances() {
+    dvec3 lower(INFINITY), upper(-INFINITY);
+    for (size_t i = 0; i < places_.size(); ++i) {
+      const Box3& bounds = scene_.meshes[scene_.instances[i].mesh].bounds;
+      if (bounds.is_empty()) continue;
+      for (int corner = 0; corner < 8; ++corner) {
+        const dvec3 point(places_[i] * dvec4(corner_of(bounds, corner), 1));
+        lower = glm::min(lower, point);
+        upper = glm::max(upper, point);
+      }
+    }
+    const vec3 middle(0.5 * (lower + upper));  // a float, so that those who have floats can add it without loss
+    if (is_far_for_its_size(lower, upper) && is_finite(middle)) scene_.origin_world = dvec3(middle);
+    for (size_t i = 0; i < places_.size(); ++i)
+      scene_.instances[i].to_world = to_affine(places_[i], scene_.origin_world);
   }
 
   /// The keys of a node and its ancestors, and the times halfway between them, in order.
@@ -397,7 +471,7 @@ class SceneReader {
     camera.half_height = std::abs(camera.half_height);
     if (!(camera.aspect > 0) || !std::isfinite(camera.aspect)) camera.aspect = 0;
     if (!(camera.z_near > 0) || !std::isfinite(camera.z_near)) camera.z_near = 0;
-    place(camera, world);
+    place(camera, world, scene_.origin_world);
     scene_.cameras.push_back(std::move(camera));
   }
 
@@ -415,11 +489,12 @@ class SceneReader {
     light.name = node.name.empty() ? source.name : node.name;
     if (source.color.size() == 3) light.color = vec3(source.color[0], source.color[1], source.color[2]);
     light.intensity = static_cast<float>(source.intensity);
-    light.position = vec3(world[3]);
+    light.position = vec3(dvec3(world[3]) - scene_.origin_world);
     light.direction = vec3(glm::normalize(-dvec3(world[2])));
     light.inner_cone_rad = static_cast<float>(source.spot.innerConeAngle);
     light.outer_cone_rad = static_cast<float>(source.spot.outerConeAngle);
     light.node = index;
+    if (moves(index)) warn(fmt::format("light {}: it is animated; it stays where it is at time 0", light.name));
     if (!is_finite(light.color) || !std::isfinite(light.intensity) || min_component(light.color) < 0 ||
         light.intensity < 0) {
       warn(fmt::format("light {}: colour or intensity is not usable; left out", light.name));
@@ -432,6 +507,7 @@ class SceneReader {
   const tinygltf::Model& model_;
   GltfScene scene_;
   std::vector<int32_t> scene_index_;  ///< of each node of the file, or -1 when it is not in the scene
+  std::vector<dmat4> places_;         ///< of the instances, in the file's coordinates
   std::set<std::string> taken_names_;
 };
 
@@ -439,7 +515,7 @@ class SceneReader {
 
 GltfCamera GltfScene::camera_at(size_t index, double seconds) const {
   GltfCamera camera = cameras[index];
-  place(camera, world_matrix(*this, camera.node, seconds));
+  place(camera, world_matrix(*this, camera.node, seconds), origin_world);
   return camera;
 }
 
@@ -450,7 +526,7 @@ std::vector<GltfInstance> GltfScene::instances_at(double seconds) const {
     const dmat4 to_world = world[instance.node] * to_square(instance.in_node);
     if (!is_invertible(to_world)) continue;
     placed.push_back(instance);
-    placed.back().to_world = to_affine(to_world);
+    placed.back().to_world = to_affine(to_world, origin_world);
   }
   return placed;
 }

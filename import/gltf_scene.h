@@ -77,8 +77,11 @@ struct GltfNode {
   std::vector<uint32_t> channels;  ///< indices into GltfScene::channels
 };
 
-/// Immutable once read; thread-safe.
+/// Immutable once read; thread-safe. "World" is the file's, less `origin_world`.
 struct GltfScene {
+  /// Subtracted from all that stands in the world, in double precision: map coordinates leave a float no digits. The
+  /// middle of the scene if that lies far from 0 for its size, else 0.
+  dvec3 origin_world{0.0};
   std::vector<GltfMesh> meshes;  ///< all of the file, instanced or not
   /// Of the default scene, in the order of a depth-first walk: all that are to be seen at some time, where they stand
   /// at time 0 or, if their transform is singular then (a plant that grows from nothing), as soon as it is not.

@@ -26,17 +26,31 @@ Result<std::vector<unsigned char>> ImageFiles::read_noted(const fs::path& path) 
   return bytes;
 }
 
+namespace {
+
+/// From the bytes that were just read, except of formats that only a file's name tells (TGA).
+Result<Texture> to_texture(const Result<std::vector<unsigned char>>& bytes, const fs::path& path, TextureUse use) {
+  if (bytes) {
+    auto image = decode_texture(*bytes, path.string(), use);
+    if (image || image.error().code != ErrorCode::Unsupported) return image;
+  }
+  return read_texture(path, use);
+}
+
+}  // namespace
+
 std::shared_ptr<const Texture> ImageFiles::read(const fs::path& folder, std::string_view name, TextureUse use) {
   const fs::path named = folder / with_slashes(name);
   const auto [found, is_new] = images_.try_emplace({named.string(), use});
   if (!is_new) return found->second;
   fs::path path = named;
-  if (!read_noted(named) && fs::is_regular_file(folder / named.filename()) && folder / named.filename() != named) {
+  auto bytes = read_noted(named);
+  if (!bytes && fs::is_regular_file(folder / named.filename()) && folder / named.filename() != named) {
     path = folder / named.filename();
-    (void)read_noted(path);
+    bytes = read_noted(path);
     mesh_.warnings.push_back(fmt::format("texture {}: not there; {} is taken", named.string(), path.string()));
   }
-  auto image = read_texture(path, use);
+  auto image = to_texture(bytes, path, use);
   if (image) return found->second = std::make_shared<const Texture>(std::move(*image));
   if (image.error().code == ErrorCode::Io) ready_ = tl::unexpected(image.error());
   mesh_.warnings.push_back(fmt::format("texture: {}; the plain colour is used", image.error().message));

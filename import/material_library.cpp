@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "import/derived_maps.h"
 #include "import/text_cursor.h"
 
 namespace farfield {
@@ -47,29 +48,6 @@ bool is_mask(const Texture& image, float cutoff) {
   const auto is_open = [&](const auto& texel) { return texel[3] >= 65535.0f * cutoff; };
   return std::any_of(level.texels.begin(), level.texels.end(), is_open) &&
          !std::all_of(level.texels.begin(), level.texels.end(), is_open);
-}
-
-/// The first channels of two images as glTF packs them: g from the one, b from the other, 1 where one is missing. As
-/// large as the larger one.
-Texture pack_metallic_roughness(const Texture* roughness, const Texture* metallic) {
-  const Texture* images[] = {roughness, metallic};
-  int width = 1, height = 1;
-  for (const Texture* image : images) {
-    if (image) width = std::max(width, image->width()), height = std::max(height, image->height());
-  }
-  std::vector<vec4> texels(static_cast<size_t>(width) * static_cast<size_t>(height), vec4(1.0f));
-  for (int channel = 0; channel < 2; ++channel) {
-    const Texture* image = images[channel];
-    if (!image) continue;
-    for (int y = 0; y < height; ++y) {
-      for (int x = 0; x < width; ++x) {
-        const auto from = [](int i, int size, int of) { return static_cast<int>(int64_t{i} * of / size); };
-        texels[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)][1 + channel] =
-            image->texel(image->level(0), from(x, width, image->width()), from(y, height, image->height())).x;
-      }
-    }
-  }
-  return Texture(width, height, texels);
 }
 
 }  // namespace
@@ -123,12 +101,15 @@ Result<void> MaterialLibraries::finish() {
 SourceMaterial MaterialLibraries::convert(const Entry& entry, UvTransform& uv) {
   const MtlMaterial& mtl = entry.mtl;
   SourceMaterial out;
+  out.name = mtl.name;
   set_specular(mtl, entry.is_from_blender, out);
   set_alpha(entry, out);
   set_color(entry, out);
   set_metallic_roughness_map(entry, out);
+  set_emission(entry, out);
+  set_normals(entry, out);
   const MtlMap* first = nullptr;
-  for (const MtlMap* map : {&mtl.map_kd, &mtl.map_pr, &mtl.map_pm, &mtl.map_d}) {
+  for (const MtlMap* map : {&mtl.map_kd, &mtl.map_pr, &mtl.map_pm, &mtl.map_d, &mtl.map_ke, &mtl.norm, &mtl.bump}) {
     if (!*map) continue;
     if (!first) first = map;
     if (map->scale != first->scale || map->offset != first->offset) {
@@ -162,7 +143,7 @@ void MaterialLibraries::set_alpha(const Entry& entry, SourceMaterial& out) {
     warn(fmt::format("material {}: Tr 1 alone is taken for opaque; write d 0 for what is not to be seen", mtl.name));
   }
   if (mtl.map_d) {
-    out.alpha_map = texture(entry, mtl.map_d, TextureUse::Mask);
+    out.alpha_map = mask(entry, mtl.map_d);
     if (out.alpha_map) out.alpha_mode = AlphaMode::Mask;
     if (out.alpha_mode != AlphaMode::Opaque && out.alpha < out.alpha_cutoff) {
       warn(fmt::format("material {}: dissolve {} beside an opacity map would leave nothing; the map alone is used",
@@ -170,10 +151,7 @@ void MaterialLibraries::set_alpha(const Entry& entry, SourceMaterial& out) {
       out.alpha = 1;
     }
   }
-  if (out.alpha < 1.0f && out.alpha_mode == AlphaMode::Opaque) {
-    out.alpha_mode = AlphaMode::Mask;
-    warn(fmt::format("material {}: dissolve {} is cut at 0.5, there is no partial transparency", mtl.name, out.alpha));
-  }
+  if (out.alpha < 1.0f && out.alpha_mode == AlphaMode::Opaque) out.alpha_mode = AlphaMode::Blend;
 }
 
 /// A map multiplies Kd, and Kd is white without one: not black, as a missing number reads. Its file's own alpha is cut
@@ -212,8 +190,49 @@ void MaterialLibraries::set_metallic_roughness_map(const Entry& entry, SourceMat
   if (metallic && out.metallic == 0) warn(fmt::format("material {}: Pm 0 switches map_Pm off", mtl.name));
   if (roughness && out.roughness == 0) warn(fmt::format("material {}: Pr 0 switches map_Pr off", mtl.name));
   out.metallic_roughness_map = roughness ? roughness : metallic;
-  out.metallic_roughness_map.image =
-      std::make_shared<const Texture>(pack_metallic_roughness(roughness.image.get(), metallic.image.get()));
+  out.metallic_roughness_map.image = std::make_shared<const Texture>(
+      pack_metallic_roughness(roughness.image.get(), mtl.map_pr.channel, metallic.image.get(), mtl.map_pm.channel));
+}
+
+/// A map multiplies Ke, and Ke is white without one.
+void MaterialLibraries::set_emission(const Entry& entry, SourceMaterial& out) {
+  const MtlMaterial& mtl = entry.mtl;
+  out.emission = mtl.ke.value_or(vec3(mtl.map_ke ? 1.0f : 0.0f));
+  if (!mtl.map_ke) return;
+  if (out.emission == vec3(0.0f)) {
+    warn(fmt::format("material {}: Ke 0 switches map_Ke off", mtl.name));
+    return;
+  }
+  out.emission_map = texture(entry, mtl.map_ke, TextureUse::Color);
+  if (!out.emission_map && !mtl.ke) out.emission = vec3(0.0f);
+}
+
+/// A normal map, or one made of heights. Blender and others write normal maps as map_Bump: their colour shows it.
+void MaterialLibraries::set_normals(const Entry& entry, SourceMaterial& out) {
+  const MtlMaterial& mtl = entry.mtl;
+  const MtlMap& map = mtl.norm ? mtl.norm : mtl.bump;
+  if (!map) return;
+  out.normal_map = texture(entry, map, TextureUse::Data);
+  if (!out.normal_map) return;
+  if (mtl.norm && mtl.bump && mtl.bump.file != mtl.norm.file) {
+    warn(fmt::format("material {}: bump is ignored beside norm", mtl.name));
+  }
+  if (mtl.norm || looks_like_normals(*out.normal_map.image)) {
+    out.normal_scale = map.bump_scale;
+    if (!mtl.norm)
+      warn(fmt::format("material {}: bump {} is a normal map by its colours; read as such", mtl.name, map.file));
+    return;
+  }
+  out.normal_map.image = std::make_shared<const Texture>(
+      normals_of_heights(*out.normal_map.image, map.channel, map.bump_scale, out.normal_map.wrap_u));
+}
+
+/// What map_d says, from the channel that -imfchan names.
+SourceTexture MaterialLibraries::mask(const Entry& entry, const MtlMap& map) {
+  if (map.channel == 0 || map.channel == 'm') return texture(entry, map, TextureUse::Mask);
+  SourceTexture out = texture(entry, map, TextureUse::Data);
+  if (out) out.image = std::make_shared<const Texture>(mask_of_channel(*out.image, map.channel));
+  return out;
 }
 
 SourceTexture MaterialLibraries::texture(const Entry& entry, const MtlMap& map, TextureUse use) {
@@ -226,7 +245,7 @@ SourceTexture MaterialLibraries::texture(const Entry& entry, const MtlMap& map, 
 /// A file of which nothing would be left says it wrongly, as exporters do that write d for Tr.
 void MaterialLibraries::keep_what_would_vanish() {
   const auto vanishes = [](const SourceMaterial& m) {
-    return m.alpha_mode == AlphaMode::Mask && m.alpha < m.alpha_cutoff;
+    return m.alpha == 0 || (m.alpha_mode == AlphaMode::Mask && m.alpha < m.alpha_cutoff);
   };
   if (mesh_.face_count() == 0) return;
   if (!std::all_of(mesh_.face_material.begin(), mesh_.face_material.end(),

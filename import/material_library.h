@@ -57,6 +57,9 @@ class MaterialLibraries {
   void set_alpha(const Entry& entry, SourceMaterial& out);
   void set_color(const Entry& entry, SourceMaterial& out);
   void set_metallic_roughness_map(const Entry& entry, SourceMaterial& out);
+  void set_emission(const Entry& entry, SourceMaterial& out);
+  void set_normals(const Entry& entry, SourceMaterial& out);
+  SourceTexture mask(const Entry& entry, const MtlMap& map);
   SourceTexture texture(const Entry& entry, const MtlMap& map, TextureUse use);
   void keep_what_would_vanish();
 

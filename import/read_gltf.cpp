@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <set>
 
 #include "base/hash.h"
 #include "base/result.h"
+#include "import/corner_normals.h"
 #include "import/gltf_document.h"
+#include "import/gltf_nodes.h"
 #include "import/read_formats.h"
 
 namespace farfield {
@@ -360,30 +363,54 @@ class GltfMeshReader {
       }
       return {};
     }
+    const std::vector<int> order = scene_nodes(document_);
+    const std::vector<glm::dmat4> world = world_matrices(order);
+    const std::vector<bool> hidden = hidden_nodes(document_);
+    for (const int n : order) {
+      const auto& node = model_.nodes[static_cast<size_t>(n)];
+      if (node.mesh < 0 || hidden[static_cast<size_t>(n)]) continue;
+      FARFIELD_TRY_LET(const auto place, node.skin >= 0 ? skeleton_place(n, world) : world[static_cast<size_t>(n)]);
+      FARFIELD_TRY(add_node(n, place));
+    }
+    return {};
+  }
+
+  std::vector<glm::dmat4> world_matrices(const std::vector<int>& order) const {
     const std::vector<int> parent = parents(model_);
     std::vector<glm::dmat4> world(model_.nodes.size(), glm::dmat4(1.0));
-    for (const int n : scene_nodes(document_)) {
+    for (const int n : order) {
       const auto at = static_cast<size_t>(n);
-      const auto& node = model_.nodes[at];
-      world[at] = to_matrix(transform_of(node));
+      world[at] = to_matrix(transform_of(model_.nodes[at]));
       if (parent[at] >= 0) world[at] = world[static_cast<size_t>(parent[at])] * world[at];
-      if (node.mesh < 0) continue;
-      // glTF 2.0, 3.7.3.3: a skinned mesh stands where its skeleton is, not where its node is.
-      if (node.skin >= 0)
-        mesh_.warnings.push_back(fmt::format("node {}: skinning is ignored, the mesh is taken as stored", n));
-      FARFIELD_TRY_LET(const auto instances, instance_transforms(document_, node));
-      size_t singular = 0;
-      for (const glm::dmat4& instance : instances) {
-        const glm::dmat4 to_world = world[at] * instance;
-        if (!is_invertible(to_world)) {
-          ++singular;
-        } else if (auto done = add_mesh(node.mesh, to_world); !done) {
-          return done;
-        }
+    }
+    return world;
+  }
+
+  Result<glm::dmat4> skeleton_place(int n, const std::vector<glm::dmat4>& world) {
+    const auto& node = model_.nodes[static_cast<size_t>(n)];
+    FARFIELD_TRY_LET(const auto place, skin_place(document_, node));
+    mesh_.warnings.push_back(fmt::format("node {} ({}): {}", n, node.name, place ? kSkinned : kBrokenSkin));
+    return place ? world[static_cast<size_t>(place->joint)] * place->in_joint : world[static_cast<size_t>(n)];
+  }
+
+  /// All instances of a node's mesh.
+  Result<void> add_node(int n, const glm::dmat4& place) {
+    const auto& node = model_.nodes[static_cast<size_t>(n)];
+    FARFIELD_TRY_LET(const auto instances, instance_transforms(document_, node));
+    size_t singular = 0;
+    for (const glm::dmat4& instance : instances) {
+      const glm::dmat4 to_world = place * instance;
+      if (!is_invertible(to_world)) {
+        ++singular;
+      } else if (auto done = add_mesh(node.mesh, to_world); !done) {
+        return done;
       }
-      if (singular > 0) {
-        mesh_.warnings.push_back(fmt::format("node {} ({}): its transform is singular; left out", n, node.name));
-      }
+    }
+    if (singular > 0) {
+      mesh_.warnings.push_back(fmt::format("node {} ({}): its transform is singular; left out", n, node.name));
+    }
+    if (has_weights_of_its_own(document_, node)) {
+      mesh_.warnings.push_back(fmt::format("node {} ({}): {}", n, node.name, kOwnWeights));
     }
     return {};
   }
@@ -392,10 +419,7 @@ class GltfMeshReader {
     const auto& mesh = model_.meshes[static_cast<size_t>(index)];
     for (size_t p = 0; p < mesh.primitives.size(); ++p) {
       const auto place = fmt::format("mesh {} primitive {}", index, p);
-      if (auto done = add_primitive(mesh.primitives[p], to_world, place); !done) return done;
-    }
-    if (std::any_of(mesh.weights.begin(), mesh.weights.end(), [](double w) { return w != 0; })) {
-      mesh_.warnings.push_back(fmt::format("mesh {}: morph targets are ignored", index));
+      if (auto done = add_primitive(mesh.primitives[p], mesh.weights, to_world, place); !done) return done;
     }
     return {};
   }
@@ -422,11 +446,30 @@ class GltfMeshReader {
     return to_triangles(indices, mode);
   }
 
-  Result<void> add_primitive(const tinygltf::Primitive& primitive, const glm::dmat4& to_world,
-                             const std::string& place) {
+  /// Adds what the mesh's weights take of the morph targets to positions or normals.
+  Result<void> add_morphs(const tinygltf::Primitive& primitive, const std::vector<double>& weights,
+                          const char* attribute, std::vector<double>& values) {
+    for (size_t t = 0; t < std::min(weights.size(), primitive.targets.size()); ++t) {
+      const auto found = primitive.targets[t].find(attribute);
+      if (weights[t] == 0 || found == primitive.targets[t].end() || found->second < 0) continue;
+      FARFIELD_TRY_LET(const auto offsets, read_accessor(document_, found->second, 3));
+      for (size_t i = 0; i < std::min(values.size(), offsets.size()); ++i) values[i] += weights[t] * offsets[i];
+    }
+    return {};
+  }
+
+  /// Lines and points have no surface. Said once per mesh, however often it stands in the scene.
+  void warn_of_lines(const std::string& place) {
+    if (said_.insert(place).second)
+      mesh_.warnings.push_back(place + ": points or lines; they have no surface, left out");
+  }
+
+  Result<void> add_primitive(const tinygltf::Primitive& primitive, const std::vector<double>& weights,
+                             const glm::dmat4& to_world, const std::string& place) {
     const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
     const auto position = primitive.attributes.find("POSITION");
-    if (mode < TINYGLTF_MODE_TRIANGLES || position == primitive.attributes.end()) return {};  // points and lines
+    if (mode < TINYGLTF_MODE_TRIANGLES) return warn_of_lines(place), Result<void>();
+    if (position == primitive.attributes.end()) return {};
     if (mode > TINYGLTF_MODE_TRIANGLE_FAN) return document_.bad(fmt::format("{}: unknown mode {}", place, mode));
 
     const auto& accessor = model_.accessors[static_cast<size_t>(position->second)];
@@ -435,7 +478,8 @@ class GltfMeshReader {
                         fmt::format("{}: {}: positions are compressed (Draco or meshopt); export without compression",
                                     document_.name, place));
     }
-    FARFIELD_TRY_LET(const auto points, read_accessor(document_, position->second, 3));
+    FARFIELD_TRY_LET(auto points, read_accessor(document_, position->second, 3));
+    FARFIELD_TRY(add_morphs(primitive, weights, "POSITION", points));
     const size_t vertex_count = points.size() / 3;
     FARFIELD_TRY_LET(const auto triangles, triangles_of(primitive, vertex_count, mode, place));
     if (mesh_.face_count() + triangles.size() > kMaxTriangles) {
@@ -456,17 +500,18 @@ class GltfMeshReader {
       mesh_.face_begin.push_back(static_cast<uint32_t>(mesh_.corner_count()));
       mesh_.face_material.push_back(material);
     }
-    FARFIELD_TRY(add_normals(primitive, triangles, to_world, vertex_count, first_corner, place));
+    FARFIELD_TRY(add_normals(primitive, weights, triangles, to_world, vertex_count, first_corner, place));
     FARFIELD_TRY(add_uvs(primitive, triangles, material, vertex_count, first_corner, place));
     return add_colors(primitive, triangles, vertex_count, first_corner, place);
   }
 
-  Result<void> add_normals(const tinygltf::Primitive& primitive, const std::vector<uvec3>& triangles,
-                           const glm::dmat4& to_world, size_t vertex_count, size_t first_corner,
-                           const std::string& place) {
+  Result<void> add_normals(const tinygltf::Primitive& primitive, const std::vector<double>& weights,
+                           const std::vector<uvec3>& triangles, const glm::dmat4& to_world, size_t vertex_count,
+                           size_t first_corner, const std::string& place) {
     const auto attribute = primitive.attributes.find("NORMAL");
     if (attribute == primitive.attributes.end()) return {};
-    FARFIELD_TRY_LET(const auto values, read_accessor(document_, attribute->second, 3));
+    FARFIELD_TRY_LET(auto values, read_accessor(document_, attribute->second, 3));
+    FARFIELD_TRY(add_morphs(primitive, weights, "NORMAL", values));
     if (values.size() / 3 < vertex_count) return document_.bad(place + ": fewer normals than vertices");
     // Normals go with the inverse transpose; its length does not matter, and surfaces have two sides.
     const glm::dmat3 normal_to_world = glm::transpose(glm::inverse(glm::dmat3(to_world)));
@@ -474,9 +519,7 @@ class GltfMeshReader {
     for (const uvec3& t : triangles) {
       for (int k = 0; k < 3; ++k) {
         const double* n = &values[3 * size_t{t[k]}];
-        const dvec3 normal = normal_to_world * dvec3(n[0], n[1], n[2]);
-        const double length = glm::length(normal);
-        mesh_.corner_normal.push_back(length > 0 ? vec3(normal / length) : vec3(0.0f));
+        mesh_.corner_normal.push_back(unit_normal(normal_to_world * dvec3(n[0], n[1], n[2])));
       }
     }
     return {};
@@ -529,6 +572,7 @@ class GltfMeshReader {
   const Model& model_;
   SourceMesh mesh_;
   MaterialReader materials_;
+  std::set<std::string> said_;  ///< places
 };
 
 }  // namespace

@@ -55,6 +55,8 @@ int value_count(std::string_view option) {
   return 0;  // not an option of MTL
 }
 
+constexpr float kBrightest = 1e9f;  // of what glows
+
 class MtlReader {
  public:
   MtlReader(std::string_view text, const std::string& name) : text_(text), name_(name) {
@@ -88,6 +90,7 @@ class MtlReader {
     MtlMaterial& m = material();
     if (key == "kd") return read_color(rest, m.kd);
     if (key == "ks") return read_color(rest, m.ks);
+    if (key == "ke") return read_color(rest, m.ke, kBrightest);
     if (key == "ns") return read_number(rest, m.ns);
     if (key == "tr") return read_number(rest, m.tr);
     if (key == "pr") return read_number(rest, m.pr);
@@ -125,15 +128,15 @@ class MtlReader {
     return true;
   }
 
-  /// One value is a grey. Values outside [0, 1] are clamped.
-  bool read_color(std::string_view rest, std::optional<vec3>& color) {
+  /// One value is a grey. Values outside [0, most] are clamped.
+  bool read_color(std::string_view rest, std::optional<vec3>& color, float most = 1) {
     vec3 value(0.0f);
     int count = 0;
     for (; count < 3; ++count) {
       const auto number = to_number(take_word(rest));
       if (!number || std::isnan(*number)) break;
-      value[count] = std::clamp(*number, 0.0f, 1.0f);
-      if (*number > 1) not_modelled(fmt::format("{} above 1", keyword_));
+      value[count] = std::clamp(*number, 0.0f, most);
+      if (*number > most) not_modelled(fmt::format("{} above {}", keyword_, most));
     }
     if (count == 0 || count == 2) {
       warn_once("is not followed by one or three numbers; ignored");
@@ -150,6 +153,9 @@ class MtlReader {
                   : is_one_of(key, {"map_tr", "map_transparency"}) ? &m.map_d
                   : key == "map_pr"                                ? &m.map_pr
                   : key == "map_pm"                                ? &m.map_pm
+                  : is_one_of(key, {"map_ke", "map_emissive"})     ? &m.map_ke
+                  : is_one_of(key, {"norm", "map_kn", "map_norm"}) ? &m.norm
+                  : is_one_of(key, {"bump", "map_bump"})           ? &m.bump
                                                                    : nullptr;
     if (!map) return false;
     if (map == &m.map_d && key.starts_with("map_tr")) warn_once("is read as map_d: white is opaque");
@@ -183,11 +189,20 @@ class MtlReader {
       const std::string value = lower_case(take_word(after));
       if (option == "-clamp")
         map.is_clamped = value == "on";
+      else if (option == "-bm" && (&map == &material().bump || &map == &material().norm))
+        map.bump_scale = to_number(value).value_or(1);
+      else if (option == "-imfchan" && takes_channel(map))
+        map.channel = is_one_of(value, {"r", "g", "b", "m", "l"}) ? value[0] : 0;
       else if (!is_default(option, value))
         not_modelled(fmt::format("{} {}", keyword_, option));
     }
     rest = after;
     return true;
+  }
+
+  bool takes_channel(const MtlMap& map) {
+    MtlMaterial& m = material();
+    return &map == &m.map_d || &map == &m.map_pr || &map == &m.map_pm || &map == &m.bump;
   }
 
   void read_numbers(const std::string& option, int most, std::string_view& rest, MtlMap& map) {
@@ -222,15 +237,14 @@ class MtlReader {
       if (rest != material().map_kd.file) not_modelled(std::string(keyword_));
       return true;
     }
-    if (is_one_of(key, {"ke", "km", "ps", "pc", "aniso"})) {
+    if (is_one_of(key, {"km", "ps", "pc", "aniso"})) {
       bool is_zero = true;
       while (!rest.empty()) is_zero = to_number(take_word(rest)) == 0.0f && is_zero;
       if (!is_zero) not_modelled(std::string(keyword_));
       return true;
     }
-    if (!is_one_of(key, {"map_ks", "map_ns", "map_ke", "map_emissive", "map_bump", "bump", "norm", "map_kn", "map_norm",
-                         "disp", "map_disp", "decal", "refl", "map_refl", "map_ps", "map_pc", "map_rma", "map_orm",
-                         "map_aat"})) {
+    if (!is_one_of(key, {"map_ks", "map_ns", "disp", "map_disp", "decal", "refl", "map_refl", "map_ps", "map_pc",
+                         "map_rma", "map_orm", "map_aat"})) {
       return false;
     }
     not_modelled(std::string(keyword_));

@@ -17,6 +17,8 @@ struct MtlMap {
   std::string file;  ///< empty: there is none
   bool is_clamped = false;
   vec2 scale{1.0f}, offset{0.0f};  ///< -s and -o: uv * scale + offset, v up
+  char channel = 0;                ///< -imfchan: r, g, b, m (alpha) or l (luminance); 0: not said
+  float bump_scale = 1;            ///< -bm
 
   explicit operator bool() const { return !file.empty(); }
 };
@@ -24,10 +26,10 @@ struct MtlMap {
 /// What is not set was not in the file.
 struct MtlMaterial {
   std::string name;
-  std::optional<vec3> kd, ks;
+  std::optional<vec3> kd, ks, ke;  ///< ke may exceed 1
   std::optional<float> ns, d, tr, pr, pm;
   std::optional<int> illum;
-  MtlMap map_kd, map_d, map_pr, map_pm;
+  MtlMap map_kd, map_d, map_pr, map_pm, map_ke, norm, bump;
   bool has_transmission_filter = false;   ///< Tf is not black
   std::vector<std::string> not_modelled;  ///< keywords and options that were read and have no effect, with their lines
 };

@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "base/index.h"
 #include "base/result.h"
+#include "import/corner_normals.h"
 #include "import/material_library.h"
 #include "import/read_formats.h"
 #include "import/text_cursor.h"
@@ -19,7 +21,10 @@ namespace fs = std::filesystem;
 class ObjReader {
  public:
   ObjReader(std::string_view text, const fs::path& path)
-      : text_(without_byte_order_mark(text)), name_(path.string()), materials_(path.parent_path(), mesh_) {}
+      : begin_(text.data()),
+        text_(without_byte_order_mark(text)),
+        name_(path.string()),
+        materials_(path.parent_path(), mesh_) {}
 
   Result<SourceMesh> read() {
     while (!text_.at_end()) read_line();
@@ -28,7 +33,10 @@ class ObjReader {
       return make_error(ErrorCode::Unsupported, fmt::format("{}: more than 2^32 face corners", name_));
     }
     drop_faces_out_of_range();
+    attach_uvs();
+    attach_normals();
     attach_colors();
+    say_what_was_ignored();
     return std::move(mesh_);
   }
 
@@ -39,8 +47,12 @@ class ObjReader {
       read_position();
     else if (keyword == "vt")
       read_uv();
+    else if (keyword == "vn")
+      read_normal();
     else if (keyword == "f")
       read_face();
+    else if (keyword == "s")
+      read_smoothing_group();
     else if (keyword == "usemtl")
       material_ = materials_.find(text_.rest_of_line());
     else if (keyword == "mtllib")
@@ -48,7 +60,16 @@ class ObjReader {
     else if (keyword.starts_with('#'))
       text_.rest_of_line();  // comments are not continued: they may end with a Windows path
     else
-      skip_line();
+      read_without_effect(keyword);
+  }
+
+  /// Names of groups and objects mean nothing here; whatever else is left out is counted, to be said once.
+  void read_without_effect(std::string_view keyword) {
+    if (!keyword.empty() && keyword != "g" && keyword != "o") {
+      Ignored& ignored = ignored_[std::string(keyword)];
+      if (ignored.count++ == 0) ignored.at = keyword.data();
+    }
+    skip_line();
   }
 
   /// To the next line; a backslash at the end of a line continues it.
@@ -97,6 +118,23 @@ class ObjReader {
     uvs_.emplace_back(static_cast<float>(u), static_cast<float>(1.0 - v));  // OBJ's v points up
   }
 
+  void read_normal() {
+    double n[3]{};
+    for (int c = 0; c < 3 && number(n[c]); ++c) {
+    }
+    skip_line();
+    normals_.push_back(unit_normal(dvec3(n[0], n[1], n[2])));
+  }
+
+  /// A number, or "off". Some exporters write "on".
+  void read_smoothing_group() {
+    skip_blanks();
+    int64_t group = 0;
+    if (!text_.integer(group)) group = text_.word() == "on" ? 1 : 0;
+    smoothing_group_ = static_cast<uint32_t>(std::clamp<int64_t>(group, 0, UINT32_MAX));
+    skip_line();
+  }
+
   /// OBJ counts from 1, or back from the latest with negative numbers. Bad ones become kNoIndex.
   static uint32_t resolve(int64_t index, size_t count) {
     if (index < 0) index += static_cast<int64_t>(count) + 1;
@@ -109,21 +147,23 @@ class ObjReader {
       int64_t index = 0;
       if (!text_.integer(index)) break;
       mesh_.corner_position.push_back(resolve(index, mesh_.positions.size()));
-      uint32_t uv = kNoIndex;
+      uint32_t uv = kNoIndex, normal = kNoIndex;
       if (text_.peek() == '/') {
         text_.advance();
         if (text_.peek() != '/' && is_digit(text_.peek()) && text_.integer(index)) uv = resolve(index, uvs_.size());
         if (text_.peek() == '/') {
           text_.advance();
-          if (is_digit(text_.peek())) text_.integer(index);  // the normal: faces have their own
+          if (is_digit(text_.peek()) && text_.integer(index)) normal = resolve(index, normals_.size());
         }
       }
       corner_uv_index_.push_back(uv);
+      corner_normal_index_.push_back(normal);
     }
     skip_line();
     if (material_ == kNoIndex) material_ = materials_.default_material();
     mesh_.face_begin.push_back(static_cast<uint32_t>(mesh_.corner_count()));
     mesh_.face_material.push_back(material_);
+    face_group_.push_back(smoothing_group_);
   }
 
   static bool is_digit(char c) { return (c >= '0' && c <= '9') || c == '-' || c == '+'; }
@@ -143,19 +183,25 @@ class ObjReader {
       for (uint32_t i = begin; i < end; ++i, ++corner_count) {
         mesh_.corner_position[corner_count] = mesh_.corner_position[i];
         corner_uv_index_[corner_count] = corner_uv_index_[i];
+        corner_normal_index_[corner_count] = corner_normal_index_[i];
       }
       mesh_.face_material[face_count] = mesh_.face_material[face];
+      face_group_[face_count] = face_group_[face];
       kept.face_begin.push_back(static_cast<uint32_t>(corner_count));
       ++face_count;
     }
     mesh_.corner_position.resize(corner_count);
     mesh_.face_material.resize(face_count);
+    face_group_.resize(face_count);
     mesh_.face_begin = std::move(kept.face_begin);
     if (dropped > 0)
       mesh_.warnings.push_back(fmt::format("{} faces name vertices that do not exist; dropped", dropped));
+  }
+
+  void attach_uvs() {
     if (uvs_.empty()) return;
-    mesh_.corner_uv.resize(corner_count);
-    for (size_t i = 0; i < corner_count; ++i) {
+    mesh_.corner_uv.resize(mesh_.corner_count());
+    for (size_t i = 0; i < mesh_.corner_count(); ++i) {
       const uint32_t uv = corner_uv_index_[i];
       // NaN marks a corner without texture coordinate; the averages know it.
       mesh_.corner_uv[i] = uv < uvs_.size() ? uvs_[uv] : vec2(std::numeric_limits<float>::quiet_NaN());
@@ -176,6 +222,23 @@ class ObjReader {
     }
   }
 
+  /// Those of vn hold; without them, smoothing groups ask for means.
+  void attach_normals() {
+    if (!normals_.empty()) {
+      mesh_.corner_normal.resize(mesh_.corner_count(), vec3(0.0f));
+      size_t lost = 0;
+      for (size_t i = 0; i < mesh_.corner_count(); ++i) {
+        const uint32_t normal = corner_normal_index_[i];
+        if (normal < normals_.size()) mesh_.corner_normal[i] = normals_[normal];
+        lost += normal != kNoIndex && normal >= normals_.size();
+      }
+      if (lost > 0) {
+        mesh_.warnings.push_back(fmt::format("{} corners name normals that do not exist; they are flat there", lost));
+      }
+    }
+    smooth_corner_normals(mesh_, face_group_);
+  }
+
   void attach_colors() {
     if (colors_.empty()) return;
     colors_.resize(mesh_.positions.size(), vec3(1.0f));
@@ -185,14 +248,34 @@ class ObjReader {
     if (mesh_.materials.size() == 1 && !materials_.is_defined(0)) mesh_.materials[0].base_color = vec3(1.0f);
   }
 
+  void say_what_was_ignored() {
+    for (const auto& [keyword, ignored] : ignored_) {
+      const char* what = keyword == "l" ? " (lines)" : keyword == "p" ? " (points)" : "";
+      mesh_.warnings.push_back(
+          fmt::format("line {}: {}{} is ignored{}", line_of(ignored.at), keyword, what,
+                      ignored.count == 1 ? "" : fmt::format(", as are {} more", ignored.count - 1)));
+    }
+  }
+
+  size_t line_of(const char* at) const { return 1 + static_cast<size_t>(std::count(begin_, at, '\n')); }
+
+  struct Ignored {
+    size_t count = 0;
+    const char* at = nullptr;  ///< in the text, where it stands first
+  };
+
+  const char* begin_;
   TextCursor text_;
   std::string name_;
   SourceMesh mesh_;
   MaterialLibraries materials_;
   uint32_t material_ = kNoIndex;
   std::vector<vec2> uvs_;
-  std::vector<vec3> colors_;
-  std::vector<uint32_t> corner_uv_index_;
+  std::vector<vec3> normals_, colors_;
+  std::vector<uint32_t> corner_uv_index_, corner_normal_index_;
+  uint32_t smoothing_group_ = 0;
+  std::vector<uint32_t> face_group_;
+  std::map<std::string, Ignored> ignored_;  ///< by keyword
 };
 
 }  // namespace

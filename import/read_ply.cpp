@@ -1,209 +1,145 @@
 // SPDX-License-Identifier: Apache-2.0
-// PLY: ascii, little and big endian; positions, colours and faces from whatever other properties stand around them.
-// A header promises counts; nothing is allocated before the bytes that would hold them are known to be there.
+// Meshes of PLY files: positions, normals, colours, texture coordinates and faces from whatever other properties stand
+// around them. A header promises counts; nothing is allocated before the bytes that would hold them are known to be
+// there. An own reader: the usual ones know no textures, and not all of PLY's types.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <cstring>
-#include <optional>
+#include <limits>
+#include <set>
 
 #include "base/result.h"
+#include "import/corner_normals.h"
+#include "import/image_files.h"
+#include "import/ply_file.h"
 #include "import/read_formats.h"
-#include "import/text_cursor.h"
 
 namespace farfield {
 namespace {
 
-enum class Encoding { Ascii, LittleEndian, BigEndian };
-enum class Type { Int8, Uint8, Int16, Uint16, Int32, Uint32, Float, Double };
+/// What a scalar property of a vertex or face means to us.
+enum class Role { X, Y, Z, NormalX, NormalY, NormalZ, Red, Green, Blue, Alpha, U, V, Texture, None };
 
-size_t size_of(Type type) {
-  constexpr std::array<size_t, 8> kSizes{1, 1, 2, 2, 4, 4, 4, 8};
-  return kSizes[static_cast<size_t>(type)];
-}
-
-std::optional<Type> parse_type(std::string_view name) {
+Role role_of(const PlyProperty& property) {
   struct Name {
     std::string_view text;
-    Type type;
+    Role role;
   };
-  constexpr Name kNames[] = {
-      {"char", Type::Int8},   {"int8", Type::Int8},     {"uchar", Type::Uint8},   {"uint8", Type::Uint8},
-      {"short", Type::Int16}, {"int16", Type::Int16},   {"ushort", Type::Uint16}, {"uint16", Type::Uint16},
-      {"int", Type::Int32},   {"int32", Type::Int32},   {"uint", Type::Uint32},   {"uint32", Type::Uint32},
-      {"float", Type::Float}, {"float32", Type::Float}, {"double", Type::Double}, {"float64", Type::Double}};
+  // MeshLab, Blender, RealityCapture, Metashape, PCL and COLMAP write these.
+  constexpr Name kNames[] = {{"x", Role::X},
+                             {"y", Role::Y},
+                             {"z", Role::Z},
+                             {"nx", Role::NormalX},
+                             {"ny", Role::NormalY},
+                             {"nz", Role::NormalZ},
+                             {"normal_x", Role::NormalX},
+                             {"normal_y", Role::NormalY},
+                             {"normal_z", Role::NormalZ},
+                             {"red", Role::Red},
+                             {"green", Role::Green},
+                             {"blue", Role::Blue},
+                             {"r", Role::Red},
+                             {"g", Role::Green},
+                             {"b", Role::Blue},
+                             {"diffuse_red", Role::Red},
+                             {"diffuse_green", Role::Green},
+                             {"diffuse_blue", Role::Blue},
+                             {"alpha", Role::Alpha},
+                             {"s", Role::U},
+                             {"t", Role::V},
+                             {"u", Role::U},
+                             {"v", Role::V},
+                             {"texture_u", Role::U},
+                             {"texture_v", Role::V},
+                             {"texture_s", Role::U},
+                             {"texture_t", Role::V},
+                             {"texnumber", Role::Texture},
+                             {"texnum", Role::Texture}};
+  if (property.count_type) return Role::None;
   for (const Name& n : kNames) {
-    if (n.text == name) return n.type;
+    if (n.text == property.name) return n.role;
   }
-  return std::nullopt;
+  return Role::None;
 }
 
-struct Property {
-  std::string name;
-  Type type = Type::Float;
-  std::optional<Type> count_type;  ///< set for lists
+bool is_indices(const PlyProperty& p) {
+  return p.count_type && (p.name == "vertex_indices" || p.name == "vertex_index");
+}
+
+bool is_corner_uvs(const PlyProperty& p) { return p.count_type && p.name == "texcoord"; }
+
+/// The scalars of one vertex or face by role.
+struct Scalars {
+  std::array<double, static_cast<size_t>(Role::None) + 1> values{};
+
+  double operator[](Role role) const { return values[static_cast<size_t>(role)]; }
+  double& operator[](Role role) { return values[static_cast<size_t>(role)]; }
+  vec3 rgb() const {
+    return vec3(static_cast<float>((*this)[Role::Red]), static_cast<float>((*this)[Role::Green]),
+                static_cast<float>((*this)[Role::Blue]));
+  }
 };
 
-struct Element {
-  std::string name;
-  uint64_t count = 0;
-  std::vector<Property> properties;
-};
+/// Colours as stored. What they mean, only all of them together say: programs store 0 .. 255 in types of any size.
+struct Colors {
+  std::vector<vec3> values;
+  PlyType type = PlyType::Uint8;
 
-struct Header {
-  Encoding encoding = Encoding::Ascii;
-  std::vector<Element> elements;
-};
-
-/// Reads values of any type as double, from text or from bytes, never past the end.
-class ValueReader {
- public:
-  ValueReader(std::string_view data, Encoding encoding) : encoding_(encoding), text_(data), left_(data) {}
-
-  bool read(Type type, double& value) {
-    if (encoding_ == Encoding::Ascii) {
-      text_.skip_blanks_and_lines();
-      return text_.number(value);
+  /// Integers are sRGB, as scanners and Blender write them; floats up to 1 are linear. What does not fill its type is
+  /// said in `note`.
+  std::vector<vec3> to_linear(std::string& note) const {
+    float most = 0;
+    for (const vec3& v : values) {
+      for (int c = 0; c < 3; ++c) most = std::max(most, v[c]);  // NaN is never more
     }
-    const size_t size = size_of(type);
-    if (left_.size() < size) return false;
-    std::array<unsigned char, 8> raw{};
-    for (size_t i = 0; i < size; ++i) {
-      const bool swap = (encoding_ == Encoding::BigEndian) != (std::endian::native == std::endian::big);
-      raw[swap ? size - 1 - i : i] = static_cast<unsigned char>(left_[i]);
+    constexpr float kBrightest = 8;  // no albedo as float is above; 0 .. 255 with no more than this is black
+    const bool is_linear = (type == PlyType::Float || type == PlyType::Double) && most <= kBrightest;
+    const float white = is_linear ? 1.0f : most <= 255 ? 255.0f : most <= 65535 ? 65535.0f : 4294967295.0f;
+    if (white == 255 && most > 1 && size_of(type) > 1) note = "colours are 0 .. 255 in a wider type; read as such";
+    std::vector<vec3> out(values.size());
+    for (size_t i = 0; i < values.size(); ++i) {
+      for (int c = 0; c < 3; ++c) {
+        const float value = values[i][c] >= 0 ? std::min(values[i][c] / white, 1.0f) : 0.0f;  // NaN becomes 0
+        out[i][c] = is_linear ? value : srgb_to_linear(value);
+      }
     }
-    left_.remove_prefix(size);
-    value = decode(type, raw.data());
-    return true;
+    return out;
   }
-
-  /// Whether the rest can hold `count` items that take at least `bytes` each as binary, and two characters as text.
-  bool can_hold(uint64_t count, uint64_t bytes, uint64_t values) {
-    const uint64_t rest = encoding_ == Encoding::Ascii ? text_rest() : left_.size();
-    const uint64_t each = encoding_ == Encoding::Ascii ? 2 * values : bytes;
-    return each == 0 || count <= (rest + 1) / each;  // + 1: the last text value needs no blank behind it
-  }
-
- private:
-  static double decode(Type type, const unsigned char* raw) {
-    const auto as = [raw](auto v) {
-      std::memcpy(&v, raw, sizeof v);
-      return static_cast<double>(v);
-    };
-    switch (type) {
-      case Type::Int8:
-        return as(int8_t{});
-      case Type::Uint8:
-        return as(uint8_t{});
-      case Type::Int16:
-        return as(int16_t{});
-      case Type::Uint16:
-        return as(uint16_t{});
-      case Type::Int32:
-        return as(int32_t{});
-      case Type::Uint32:
-        return as(uint32_t{});
-      case Type::Float:
-        return as(float{});
-      case Type::Double:
-        return as(double{});
-    }
-    return 0;
-  }
-  uint64_t text_rest() const { return static_cast<uint64_t>(left_.data() + left_.size() - text_.position()); }
-
-  Encoding encoding_;
-  TextCursor text_;
-  std::string_view left_;
 };
 
 class PlyReader {
  public:
   PlyReader(std::span<const unsigned char> bytes, const std::filesystem::path& path)
-      : data_(reinterpret_cast<const char*>(bytes.data()), bytes.size()), name_(path.string()) {}
+      : data_(reinterpret_cast<const char*>(bytes.data()), bytes.size()),
+        folder_(path.parent_path()),
+        name_(path.string()) {}
 
   Result<SourceMesh> read() {
-    size_t body = 0;
-    FARFIELD_TRY_LET(auto header, read_header(body));
-    ValueReader values(data_.substr(body), header.encoding);
-    for (const Element& element : header.elements) {
+    FARFIELD_TRY_LET(header_, read_ply_header(data_, name_));
+    PlyValues values(data_.substr(header_.body_offset), header_.encoding);
+    for (const PlyElement& element : header_.elements) {
       FARFIELD_TRY(read_element(element, values));
     }
-    return finish();
+    FARFIELD_TRY(expect_end(values));
+    FARFIELD_TRY(check_indices());
+    attach_normals();
+    attach_uvs();
+    FARFIELD_TRY(attach_textures());
+    attach_colors();
+    if (!ignored_.empty()) warn(fmt::format("{}: ignored", fmt::join(ignored_, ", ")));
+    return std::move(mesh_);
   }
 
  private:
   tl::unexpected<Error> bad(const std::string& what) const {
     return make_error(ErrorCode::BadFile, fmt::format("{}: {}", name_, what));
   }
+  void warn(std::string text) { mesh_.warnings.push_back(std::move(text)); }
 
-  Result<Header> read_header(size_t& body) {
-    TextCursor text(data_);
-    if (text.rest_of_line() != "ply") return bad("does not start with the line 'ply'");
-    Header header;
-    bool has_format = false;
-    for (int line = 2; !text.at_end(); ++line) {
-      if (line > 10000) return bad("header has more than 10000 lines");
-      const std::string_view keyword = text.word();
-      if (keyword == "end_header") {
-        // Binary data starts right behind this line's end, which may be \n or \r\n: nothing else may be skipped.
-        while (!text.at_end() && text.peek() != '\n') text.advance();
-        if (!text.at_end()) text.advance();
-        if (!has_format) return bad("header has no format line");
-        body = static_cast<size_t>(text.position() - data_.data());
-        return header;
-      }
-      if (keyword == "format") {
-        const std::string_view format = text.word();
-        if (format == "ascii")
-          header.encoding = Encoding::Ascii;
-        else if (format == "binary_little_endian")
-          header.encoding = Encoding::LittleEndian;
-        else if (format == "binary_big_endian")
-          header.encoding = Encoding::BigEndian;
-        else
-          return bad(fmt::format("header line {}: unknown format", line));
-        has_format = true;
-      } else if (keyword == "element") {
-        Element element;
-        element.name = text.word();
-        int64_t count = 0;
-        if (!text.integer(count) || count < 0) return bad(fmt::format("header line {}: bad element count", line));
-        element.count = static_cast<uint64_t>(count);
-        header.elements.push_back(std::move(element));
-      } else if (keyword == "property") {
-        if (header.elements.empty()) return bad(fmt::format("header line {}: property before any element", line));
-        auto property = read_property(text);
-        if (!property) return bad(fmt::format("header line {}: unknown property type", line));
-        header.elements.back().properties.push_back(std::move(*property));
-      } else if (!keyword.empty() && keyword != "comment" && keyword != "obj_info") {
-        return bad(fmt::format("header line {}: unknown keyword", line));
-      }
-      text.rest_of_line();
-    }
-    return bad("header has no end_header line");
-  }
-
-  static std::optional<Property> read_property(TextCursor& text) {
-    Property property;
-    std::string_view word = text.word();
-    if (word == "list") {
-      property.count_type = parse_type(text.word());
-      if (!property.count_type) return std::nullopt;
-      word = text.word();
-    }
-    const auto type = parse_type(word);
-    if (!type) return std::nullopt;
-    property.type = *type;
-    property.name = text.word();
-    return property;
-  }
-
-  Result<void> read_element(const Element& element, ValueReader& values) {
+  Result<void> read_element(const PlyElement& element, PlyValues& values) {
     uint64_t bytes = 0;
-    for (const Property& p : element.properties) bytes += size_of(p.count_type.value_or(p.type));
+    for (const PlyProperty& p : element.properties) bytes += size_of(p.count_type.value_or(p.type));
     if (!values.can_hold(element.count, bytes, element.properties.size())) {
       return bad(fmt::format("the header promises {} of '{}', the file ends before them", element.count, element.name));
     }
@@ -213,20 +149,31 @@ class PlyReader {
     if (element.name == "tristrips") {
       return make_error(ErrorCode::Unsupported, fmt::format("{}: triangle strips; save it with faces", name_));
     }
+    if (element.count > 0) ignored_.insert(fmt::format("{} of '{}'", element.count, element.name));
     for (uint64_t i = 0; i < element.count; ++i) {
-      for (const Property& p : element.properties) {
+      for (const PlyProperty& p : element.properties) {
         if (!read_value(p, values)) return cut_short(element, i);
       }
     }
     return {};
   }
 
-  tl::unexpected<Error> cut_short(const Element& element, uint64_t index) const {
+  tl::unexpected<Error> cut_short(const PlyElement& element, uint64_t index) const {
     return bad(fmt::format("{} {} of {} is cut short or not a number", element.name, index, element.count));
   }
 
+  /// More text than the header promises means that it promises fewer values than a line has, and all were shifted.
+  Result<void> expect_end(PlyValues& values) {
+    const std::string_view rest = values.rest();
+    if (rest.empty()) return {};
+    const std::string said = fmt::format("{} bytes are left over behind the last element", rest.size());
+    if (header_.encoding == PlyEncoding::Ascii) return bad(said + "; the header must name every value of a line");
+    warn(said + "; ignored");
+    return {};
+  }
+
   /// Leaves the value of a scalar in scalar_, those of a list in list_.
-  bool read_value(const Property& property, ValueReader& values) {
+  bool read_value(const PlyProperty& property, PlyValues& values) {
     if (!property.count_type) return values.read(property.type, scalar_);
     double count = 0;
     if (!values.read(*property.count_type, count)) return false;
@@ -240,92 +187,116 @@ class PlyReader {
     return true;
   }
 
-  /// Which of r, g, b a property is, or -1.
-  static int color_channel(const Property& property) {
-    constexpr std::array<std::string_view, 3> kLong{"red", "green", "blue"},
-        kDiffuse{"diffuse_red", "diffuse_green", "diffuse_blue"};
-    for (size_t c = 0; c < 3; ++c) {
-      if (!property.count_type && (property.name == kLong[c] || property.name == kDiffuse[c]))
-        return static_cast<int>(c);
-    }
-    return -1;
-  }
-
-  /// Integers are sRGB over their whole range, as scanners and Blender write them; floats are linear.
-  static float to_linear(double value, Type type) {
-    switch (type) {
-      case Type::Uint8:
-        return srgb_to_linear(static_cast<float>(value / 255.0));
-      case Type::Uint16:
-        return srgb_to_linear(static_cast<float>(value / 65535.0));
-      default:
-        return static_cast<float>(value >= 0 ? std::min(value, 1.0) : 0.0);  // NaN becomes 0
-    }
-  }
-
-  Result<void> read_vertices(const Element& element, ValueReader& values) {
-    if (!mesh_.positions.empty()) return bad("a second 'vertex' element");
-    const bool has_color = std::any_of(element.properties.begin(), element.properties.end(),
-                                       [](const Property& p) { return color_channel(p) >= 0; });
-    mesh_.positions.reserve(element.count);
-    if (has_color) vertex_colors_.reserve(element.count);
-    int axes = 0;
-    for (const Property& p : element.properties) axes |= p.name == "x" ? 1 : p.name == "y" ? 2 : p.name == "z" ? 4 : 0;
-    if (axes != 7) return bad("'vertex' has no properties x, y, z");
-    for (uint64_t i = 0; i < element.count; ++i) {
-      dvec3 position(0.0);
-      vec3 color(1.0f);
-      for (const Property& p : element.properties) {
-        if (!read_value(p, values)) return cut_short(element, i);
-        if (p.count_type) continue;
-        if (p.name == "x") position.x = scalar_;
-        if (p.name == "y") position.y = scalar_;
-        if (p.name == "z") position.z = scalar_;
-        if (const int c = color_channel(p); c >= 0) color[c] = to_linear(scalar_, p.type);
+  /// Which roles the scalars of an element have, as bits; what has none and is no list that we read is noted.
+  uint32_t roles_of(const PlyElement& element) {
+    uint32_t roles = 0;
+    for (const PlyProperty& p : element.properties) {
+      if (const Role role = role_of(p); role != Role::None) {
+        roles |= bit(role);
+        if (role == Role::Red) colors_of(element).type = p.type;
+      } else if (element.name != "face" || (!is_indices(p) && !is_corner_uvs(p))) {
+        ignored_.insert(fmt::format("{} {}", element.name, p.name));
       }
-      mesh_.positions.push_back(position);
-      if (has_color) vertex_colors_.push_back(color);
+    }
+    return roles;
+  }
+  static constexpr uint32_t bit(Role role) { return 1u << static_cast<uint32_t>(role); }
+  template <typename... Roles>
+  static bool has(uint32_t roles, Roles... wanted) {
+    return ((roles & bit(wanted)) && ...);
+  }
+  Colors& colors_of(const PlyElement& element) { return element.name == "face" ? face_colors_ : vertex_colors_; }
+
+  Result<void> read_vertices(const PlyElement& element, PlyValues& values) {
+    if (!mesh_.positions.empty()) return bad("a second 'vertex' element");
+    const uint32_t roles = roles_of(element);
+    if (!has(roles, Role::X, Role::Y, Role::Z)) return bad("'vertex' has no properties x, y, z");
+    const bool has_color = has(roles, Role::Red, Role::Green, Role::Blue), has_uv = has(roles, Role::U, Role::V);
+    const bool has_normal = has(roles, Role::NormalX, Role::NormalY, Role::NormalZ);
+    mesh_.positions.reserve(element.count);
+    Scalars vertex;
+    for (uint64_t i = 0; i < element.count; ++i) {
+      for (const PlyProperty& p : element.properties) {
+        if (!read_value(p, values)) return cut_short(element, i);
+        if (!p.count_type) vertex[role_of(p)] = scalar_;
+      }
+      mesh_.positions.emplace_back(vertex[Role::X], vertex[Role::Y], vertex[Role::Z]);
+      if (has_color) vertex_colors_.values.push_back(vertex.rgb());
+      if (has(roles, Role::Alpha)) {
+        least_alpha_ = std::min(least_alpha_, vertex[Role::Alpha]);
+        most_alpha_ = std::max(most_alpha_, vertex[Role::Alpha]);
+      }
+      if (has_uv) vertex_uvs_.push_back(uv_of(vertex[Role::U], vertex[Role::V]));
+      if (has(roles, Role::Texture)) vertex_textures_.push_back(texture_number(vertex[Role::Texture]));
+      if (has_normal) {
+        vertex_normals_.push_back(
+            unit_normal(dvec3(vertex[Role::NormalX], vertex[Role::NormalY], vertex[Role::NormalZ])));
+      }
     }
     return {};
   }
 
-  Result<void> read_faces(const Element& element, ValueReader& values) {
-    const auto is_indices = [](const Property& p) {
-      return p.count_type && (p.name == "vertex_indices" || p.name == "vertex_index");
-    };
+  /// PLY's v points up.
+  static vec2 uv_of(double u, double v) { return vec2(static_cast<float>(u), static_cast<float>(1 - v)); }
+  static uint32_t texture_number(double value) { return value >= 0 && value < 1e6 ? static_cast<uint32_t>(value) : 0; }
+
+  Result<void> read_faces(const PlyElement& element, PlyValues& values) {
     if (std::none_of(element.properties.begin(), element.properties.end(), is_indices)) {
       return bad("'face' has no list vertex_indices");
     }
+    const uint32_t roles = roles_of(element);
+    const bool has_color = has(roles, Role::Red, Role::Green, Role::Blue);
+    Scalars face;
+    std::vector<double> uvs;
     for (uint64_t i = 0; i < element.count; ++i) {
-      vec3 color(1.0f);
-      bool has_color = false;
-      for (const Property& p : element.properties) {
+      const size_t first_corner = mesh_.corner_count();
+      uvs.clear();
+      for (const PlyProperty& p : element.properties) {
         if (!read_value(p, values)) return cut_short(element, i);
         if (is_indices(p)) {
-          for (const double index : list_) {
-            // Vertices may come after the faces: only what no vertex count can make right is refused here.
-            if (!(index >= 0) || index >= 4294967295.0) {
-              return bad(fmt::format("face {} has the vertex index {}", i, index));
-            }
-            mesh_.corner_position.push_back(static_cast<uint32_t>(index));
-          }
-        } else if (const int c = color_channel(p); c >= 0) {
-          color[c] = to_linear(scalar_, p.type);
-          has_color = true;
+          FARFIELD_TRY(add_corners(i));
+        } else if (is_corner_uvs(p)) {
+          uvs = list_;
+        } else if (!p.count_type) {
+          face[role_of(p)] = scalar_;
         }
-      }
-      if (has_color) {
-        mesh_.corner_color.resize(mesh_.face_begin.back(), vec4(1.0f));
-        mesh_.corner_color.resize(mesh_.corner_count(), vec4(color, 1.0f));
       }
       if (mesh_.corner_count() > UINT32_MAX) return bad("more than 2^32 face corners");
       mesh_.face_begin.push_back(static_cast<uint32_t>(mesh_.corner_count()));
-      mesh_.face_material.push_back(0);
+      mesh_.face_material.push_back(has(roles, Role::Texture) ? texture_number(face[Role::Texture]) : 0);
+      if (has_color) face_colors_.values.push_back(face.rgb());
+      if (!uvs.empty()) FARFIELD_TRY(add_corner_uvs(uvs, first_corner, i));
+    }
+    has_face_textures_ = has(roles, Role::Texture);
+    return {};
+  }
+
+  Result<void> add_corners(uint64_t face) {
+    for (const double index : list_) {
+      // Vertices may come after the faces: only what no vertex count can make right is refused here.
+      if (!(index >= 0) || index >= 4294967295.0) {
+        return bad(fmt::format("face {} has the vertex index {}", face, index));
+      }
+      mesh_.corner_position.push_back(static_cast<uint32_t>(index));
     }
     return {};
   }
 
-  Result<SourceMesh> finish() {
+  /// MeshLab writes u and v of each corner into one list per face.
+  Result<void> add_corner_uvs(const std::vector<double>& uvs, size_t first_corner, uint64_t face) {
+    const size_t corners = mesh_.corner_count() - first_corner;
+    if (uvs.size() != 2 * corners) {
+      return bad(fmt::format("face {} has {} values in texcoord, its {} corners need {}", face, uvs.size(), corners,
+                             2 * corners));
+    }
+    mesh_.corner_uv.resize(first_corner, no_uv());
+    for (size_t k = 0; k < corners; ++k) mesh_.corner_uv.push_back(uv_of(uvs[2 * k], uvs[2 * k + 1]));
+    return {};
+  }
+
+  static vec2 no_uv() { return vec2(std::numeric_limits<float>::quiet_NaN()); }
+
+  Result<void> check_indices() {
     for (size_t i = 0; i < mesh_.corner_count(); ++i) {
       if (mesh_.corner_position[i] >= mesh_.positions.size()) {
         const auto face =
@@ -334,21 +305,108 @@ class PlyReader {
                                mesh_.positions.size()));
       }
     }
-    mesh_.materials.emplace_back();
-    if (!mesh_.corner_color.empty()) {
-      mesh_.corner_color.resize(mesh_.corner_count(), vec4(1.0f));
-    } else if (!vertex_colors_.empty()) {
-      for (const uint32_t vertex : mesh_.corner_position) mesh_.corner_color.emplace_back(vertex_colors_[vertex], 1.0f);
+    return {};
+  }
+
+  void attach_normals() {
+    if (vertex_normals_.empty()) return;
+    for (const uint32_t vertex : mesh_.corner_position) mesh_.corner_normal.push_back(vertex_normals_[vertex]);
+  }
+
+  /// Those of the faces hold; they can have a seam.
+  void attach_uvs() {
+    if (!mesh_.corner_uv.empty()) {
+      mesh_.corner_uv.resize(mesh_.corner_count(), no_uv());
+    } else if (!vertex_uvs_.empty()) {
+      for (const uint32_t vertex : mesh_.corner_position) mesh_.corner_uv.push_back(vertex_uvs_[vertex]);
     }
-    // The colour is the albedo itself, not a tint of the default grey.
-    if (!mesh_.corner_color.empty()) mesh_.materials[0].base_color = vec3(1.0f);
-    return std::move(mesh_);
+  }
+
+  /// One material per texture that the header names.
+  Result<void> attach_textures() {
+    ImageFiles images(folder_, mesh_);
+    for (const std::string& file : header_.textures) {
+      SourceMaterial& material = mesh_.materials.emplace_back();
+      material.name = file;
+      material.base_color_map.image = images.read(folder_, file, TextureUse::Color);
+      if (material.base_color_map) material.base_color = vec3(1.0f);
+    }
+    FARFIELD_TRY(images.ready());
+    if (mesh_.materials.empty()) mesh_.materials.emplace_back();
+    take_textures_of_vertices();
+    clamp_texture_numbers();
+    const bool is_mapped = !mesh_.corner_uv.empty();
+    if (is_mapped && header_.textures.empty()) {
+      warn("has texture coordinates, but no line 'comment TextureFile' names their image; it has no texture");
+    }
+    if (!is_mapped && !header_.textures.empty())
+      warn("names a texture, but has no texture coordinates; its mean is used");
+    return {};
+  }
+
+  void take_textures_of_vertices() {
+    if (vertex_textures_.empty() || has_face_textures_) return;
+    for (size_t face = 0; face < mesh_.face_count(); ++face) {
+      const uint32_t begin = mesh_.face_begin[face];
+      if (begin < mesh_.face_begin[face + 1])
+        mesh_.face_material[face] = vertex_textures_[mesh_.corner_position[begin]];
+    }
+  }
+
+  void clamp_texture_numbers() {
+    const size_t count = mesh_.materials.size();
+    size_t clamped = 0;
+    for (uint32_t& material : mesh_.face_material) {
+      if (material < count) continue;
+      material = 0;
+      ++clamped;
+    }
+    if (clamped > 0 && !header_.textures.empty()) {
+      warn(fmt::format("{} faces have a texnumber that no TextureFile has; the first texture is taken", clamped));
+    }
+    if (header_.textures.size() > 1 && !has_face_textures_ && vertex_textures_.empty()) {
+      warn(fmt::format("names {} textures, but no face or vertex has a texnumber; {} is taken for all",
+                       header_.textures.size(), header_.textures[0]));
+    }
+  }
+
+  /// A colour is the albedo itself, not a tint of the default grey. Scans have the same albedo twice, as colours and as
+  /// texture: not to be multiplied.
+  void attach_colors() {
+    const bool is_textured = std::any_of(mesh_.materials.begin(), mesh_.materials.end(),
+                                         [](const SourceMaterial& m) { return bool(m.base_color_map); });
+    if (vertex_colors_.values.empty() && face_colors_.values.empty()) return;
+    if (is_textured) {
+      warn("has colours beside its texture; the texture alone is used");
+      return;
+    }
+    std::string note;
+    if (!face_colors_.values.empty()) {
+      const auto colors = face_colors_.to_linear(note);
+      for (size_t face = 0; face < mesh_.face_count(); ++face) {
+        mesh_.corner_color.resize(mesh_.face_begin[face + 1], vec4(colors[face], 1.0f));
+      }
+    } else {
+      const auto colors = vertex_colors_.to_linear(note);
+      for (const uint32_t vertex : mesh_.corner_position) mesh_.corner_color.emplace_back(colors[vertex], 1.0f);
+    }
+    if (!note.empty()) warn(note);
+    if (least_alpha_ < most_alpha_) warn("the alpha of its colours is ignored");
+    for (SourceMaterial& material : mesh_.materials) material.base_color = vec3(1.0f);
   }
 
   std::string_view data_;
+  std::filesystem::path folder_;
   std::string name_;
+  PlyHeader header_;
   SourceMesh mesh_;
-  std::vector<vec3> vertex_colors_;
+  Colors vertex_colors_, face_colors_;
+  std::vector<vec2> vertex_uvs_;
+  std::vector<vec3> vertex_normals_;
+  std::vector<uint32_t> vertex_textures_;
+  bool has_face_textures_ = false;
+  double least_alpha_ = std::numeric_limits<double>::infinity(), most_alpha_ = 0;
+  std::set<std::string> ignored_;  ///< what the header names and nothing here reads
   double scalar_ = 0;
   std::vector<double> list_;
 };

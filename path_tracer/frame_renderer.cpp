@@ -59,13 +59,13 @@ std::string make_fingerprint(const RenderOptions& options, std::span<const fs::p
   return text;
 }
 
-Metadata frame_metadata(const RenderOptions& options, const Camera& camera, int frame) {
+Metadata frame_metadata(const RenderOptions& options, const GltfScene& scene, const Camera& camera, int frame) {
   const TessellationCamera pixel = camera.tessellation();
   return {
       {"camera.forward", camera.forward()},
       {"camera.pixel_spread", pixel.pixel_spread},
       {"camera.pixel_width", pixel.pixel_width},
-      {"camera.position", camera.position()},
+      {"camera.position", vec3(dvec3(camera.position()) + scene.origin_world)},
       {"camera.up", camera.up()},
       {"farfield.budget", fmt::format("{}", options.budget_bytes)},
       {"farfield.frame", frame},
@@ -78,9 +78,9 @@ Metadata frame_metadata(const RenderOptions& options, const Camera& camera, int 
 }
 
 // With ids: whose they are.
-Metadata frame_metadata(const RenderOptions& options, const Camera& camera, int frame,
+Metadata frame_metadata(const RenderOptions& options, const GltfScene& scene, const Camera& camera, int frame,
                         std::span<const GltfInstance> instances) {
-  Metadata metadata = frame_metadata(options, camera, frame);
+  Metadata metadata = frame_metadata(options, scene, camera, frame);
   if (!options.cryptomatte) return metadata;
   std::set<std::string> names;
   for (const GltfInstance& instance : instances) names.insert(object_name(instance));
@@ -109,21 +109,24 @@ bool any_has_textures(const std::vector<std::filesystem::path>& folders) {
 
 }  // namespace
 
-Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOptions& options) {
-  if (options.width < 1 || options.height < 1 || options.width > kLargestSide || options.height > kLargestSide)
-    return make_error(ErrorCode::InvalidArgument, fmt::format("images of {} x {} pixels: 1 to {} each way",
-                                                              options.width, options.height, kLargestSide));
+Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOptions& given) {
+  if (given.width < 1 || given.height < 1 || given.width > kLargestSide || given.height > kLargestSide)
+    return make_error(ErrorCode::InvalidArgument, fmt::format("images of {} x {} pixels: 1 to {} each way", given.width,
+                                                              given.height, kLargestSide));
   std::unique_ptr<FrameRenderer> renderer(new FrameRenderer);
-  renderer->options_ = options;
+  renderer->warnings_ = std::make_shared<WarningLog>(given.warning);
+  renderer->options_ = given;
+  renderer->options_.warning = [log = renderer->warnings_](const std::string& line) { log->add(line); };
+  const RenderOptions& options = renderer->options_;
 
   FARFIELD_TRY_LET(auto scene, read_gltf_scene(options.scene));
+  for (const std::string& warning : scene.warnings) options.warning(warning);  // before an error may come
   FARFIELD_TRY_LET(const auto camera, find_camera(scene, options.camera));
   renderer->camera_ = camera;
   if (options.frames_per_second > 0) scene.frames_per_second = options.frames_per_second;
-  std::vector<std::string> warnings = scene.warnings;
-  FARFIELD_TRY_LET(auto lights, make_lights(scene, options, warnings));
-  if (options.warning)
-    for (const std::string& warning : warnings) options.warning(warning);
+  std::vector<std::string> of_lights;
+  FARFIELD_TRY_LET(auto lights, make_lights(scene, options, of_lights));
+  for (const std::string& warning : of_lights) options.warning(warning);
 
   FARFIELD_TRY_LET(auto folders, find_or_bake_assets(scene, options));
   for (size_t mesh = 0; mesh < folders.size(); ++mesh)
@@ -172,7 +175,8 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     report.frames.push_back(std::move(frame));
     report.peak_accounted_bytes = std::max(report.peak_accounted_bytes, session->stats().peak_accounted_bytes);
     report.peak_rss_bytes = memory.peak_bytes();
-    const Metadata metadata = frame_metadata(options_, camera, frames[i], session_instances);
+    report.warnings = warnings_->lines();
+    const Metadata metadata = frame_metadata(options_, scene_, camera, frames[i], session_instances);
     if (auto taken = sink(film.image(), metadata, report); !taken) return tl::unexpected(taken.error());
   }
   report.peak_rss_bytes = memory.peak_bytes();

@@ -14,6 +14,7 @@
 #include "path_tracer/image.h"
 #include "path_tracer/integrator.h"
 #include "path_tracer/render_job.h"
+#include "path_tracer/warning_log.h"
 
 namespace farfield {
 
@@ -39,7 +40,8 @@ class FrameRenderer {
  private:
   FrameRenderer() = default;
 
-  RenderOptions options_;
+  RenderOptions options_;  // its warnings go by way of warnings_
+  std::shared_ptr<WarningLog> warnings_;
   GltfScene scene_;
   size_t camera_ = 0;  // index into scene_.cameras
   Lights lights_;

@@ -38,7 +38,8 @@ struct RenderOptions {
   /// Command that bakes: called as BAKER bake SCENE -o DIR --mesh N ... Empty: this very program.
   std::filesystem::path baker;
   std::function<void(const std::string& line)> message;  ///< for a person who waits, one line each; may be empty
-  std::function<void(const std::string& line)> warning;  ///< what is ignored, guessed or degraded; may be empty
+  std::function<void(const std::string& line)> warning;  ///< what is ignored, guessed or degraded, each line
+                                                         ///< once; from any thread; may be empty
   Job job;                                               ///< reports from any thread
 };
 
@@ -64,6 +65,7 @@ struct RenderReport {
   uint64_t peak_rss_bytes = 0;        ///< highest since then
   uint64_t peak_accounted_bytes = 0;  ///< highest that the runtime counted against the budget
   std::vector<FrameReport> frames;    ///< those that are finished, in order
+  std::vector<std::string> warnings;  ///< each once, in the order they came
 };
 
 /// Renders one frame to `out` (EXR with the channels of film.h and metadata) and to the PNG beside it.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "path_tracer/warning_log.h"
+
 namespace farfield {
 
 using Json = nlohmann::ordered_json;
@@ -60,6 +62,7 @@ std::string to_json(const ShotRecord& record) {
                      {"peak_accounted_bytes", report.peak_accounted_bytes},
                      {"fingerprint", record.fingerprint},
                      {"assets", report.assets},
+                     {"warnings", report.warnings},
                      {"frames", frames}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -75,6 +78,7 @@ std::optional<ShotRecord> shot_record_from_json(const std::string& text) {
     json.at("peak_accounted_bytes").get_to(report.peak_accounted_bytes);
     json.at("fingerprint").get_to(record.fingerprint);
     json.at("assets").get_to(report.assets);
+    report.warnings = json.value("warnings", std::vector<std::string>());  // absent before version 0.1
     for (const Json& frame : json.at("frames")) report.frames.push_back(frame_from_json(frame, report.assets));
     return record;
   } catch (const Json::exception&) {
@@ -85,6 +89,8 @@ std::optional<ShotRecord> shot_record_from_json(const std::string& text) {
 RenderReport join_reports(const RenderReport& earlier, const RenderReport& later) {
   RenderReport joined = later.frames.empty() || beyond_baseline(earlier) > beyond_baseline(later) ? earlier : later;
   joined.peak_accounted_bytes = std::max(earlier.peak_accounted_bytes, later.peak_accounted_bytes);
+  joined.warnings = earlier.warnings;
+  add_new_lines(joined.warnings, later.warnings);
   joined.frames = earlier.frames;
   joined.frames.insert(joined.frames.end(), later.frames.begin(), later.frames.end());
   std::stable_sort(joined.frames.begin(), joined.frames.end(),

@@ -19,7 +19,7 @@ Result<void> run_render(FrameArguments& arguments) {
           check_can_write(arguments.output, Output::Exr, {arguments.scene, arguments.environment, arguments.assets});
       !writable)
     return writable;
-  const auto report = run_with_progress(arguments, [&](const RenderOptions& options) {
+  const auto report = run_with_progress("render", arguments, [&](const RenderOptions& options) {
     return render_frame(options, arguments.frame, arguments.output);
   });
   if (!report) return tl::unexpected(report.error());

@@ -83,7 +83,7 @@ void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::
       ->capture_default_str();
 }
 
-Result<RenderReport> run_with_progress(RenderArguments& arguments,
+Result<RenderReport> run_with_progress(std::string_view command, RenderArguments& arguments,
                                        const std::function<Result<RenderReport>(const RenderOptions&)>& job) {
   const ThreadLimit limit(arguments.threads);
   ProgressLine progress;
@@ -99,7 +99,7 @@ Result<RenderReport> run_with_progress(RenderArguments& arguments,
   };
   options.warning = [&](const std::string& line) {
     progress.clear();
-    print_warnings("render", {line});
+    print_warnings(command, {line});
   };
   return job(options);
 }

@@ -17,7 +17,7 @@ struct ShotArguments : RenderArguments {
 };
 
 Result<void> run_shot(ShotArguments& arguments) {
-  const auto report = run_with_progress(arguments, [&](const RenderOptions& options) {
+  const auto report = run_with_progress("shot", arguments, [&](const RenderOptions& options) {
     return render_shot(options, arguments.frames, arguments.output);
   });
   if (!report) return tl::unexpected(report.error());

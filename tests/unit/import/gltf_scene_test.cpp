@@ -40,6 +40,57 @@ std::string scene_file(const std::string& nodes, const std::string& roots, const
   return glb(json, triangle + extra);
 }
 
+TEST(GltfScene, LightsOfMapCoordinatesMoveAlong) {
+  const TemporaryFolder folder;
+  const std::string light = R"("extensions":{"KHR_lights_punctual":{"lights":[{"type":"point"}]}})";
+  const auto scene = read_gltf_scene(folder.write("far.glb", scene_file(
+                                                                 R"({"mesh":0,"translation":[4500000,0,0]},
+         {"translation":[4500000,2.125,0],"extensions":{"KHR_lights_punctual":{"light":0}}})",
+                                                                 "0,1", light)));
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->lights.size(), 1u);
+  EXPECT_LT(distance(scene->lights[0].position - scene->instances[0].to_world[3], vec3(0, 2.125f, 0)), 1e-6f);
+}
+
+TEST(GltfScene, InstancesInMapCoordinatesCountForTheOrigin) {
+  const TemporaryFolder folder;
+  const auto scene = read_gltf_scene(
+      folder.write("far.glb", scene_file(R"({"mesh":0,"translation":[0.125,0,0],
+                     "extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":1}}}})",
+                                         "0", "", raw<float>({4500000, 0, 0, 4500002, 0, 0}),
+                                         R"({"bufferView":1,"componentType":5126,"count":2,"type":"VEC3"})")));
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->instances.size(), 2u);
+  EXPECT_NEAR(scene->origin_world.x, 4500001, 2);
+  for (size_t i = 0; i < 2; ++i) {
+    EXPECT_DOUBLE_EQ(scene->origin_world.x + static_cast<double>(scene->instances[i].to_world[3].x),
+                     4500000.125 + 2.0 * static_cast<double>(i));
+  }
+}
+
+TEST(GltfScene, AMeshWhosePointsAreFarFromItsOriginIsWarnedAbout) {
+  const TemporaryFolder folder;
+  std::string file = scene_file(R"({"mesh":0})", "0", "", "",
+                                R"({"componentType":5126,"count":3,"type":"VEC3","min":[9e6,0,0],"max":[9e6,1,0]})");
+  const std::string near = R"("POSITION":0)", far = R"("POSITION":1)";
+  const auto scene = read_gltf_scene(folder.write("far.glb", file.replace(file.find(near), near.size(), far)));
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->warnings.size(), 1u);
+  EXPECT_NE(scene->warnings[0].find("mesh tri"), std::string::npos) << scene->warnings[0];
+}
+
+TEST(GltfScene, OneBrokenMeshIsLeftOutByName) {
+  const TemporaryFolder folder;
+  std::string file =
+      scene_file(R"({"mesh":0},{"mesh":0})", "0,1", "", "", R"({"componentType":5126,"count":3,"type":"VEC2"})");
+  const std::string whole = R"("POSITION":0}}]})", torn = R"("POSITION":1}}]})";
+  const auto broken = read_gltf_scene(folder.write("torn.glb", file.replace(file.find(whole), whole.size(), torn)));
+  ASSERT_TRUE(broken) << broken.error().message;
+  EXPECT_EQ(broken->meshes.at(0).triangle_count, 0u);
+  ASSERT_EQ(broken->warnings.size(), 1u);
+  EXPECT_NE(broken->warnings[0].find("mesh 0 (tri)"), std::string::npos) << broken->warnings[0];
+}
+
 TEST(GltfScene, ForestHasItsInstancesSpeciesSunAndCamera) {
   const fs::path file = kAssets / "forest/forest_pullback.glb";
   if (!fs::exists(file)) GTEST_SKIP() << file << " is not here";
@@ -225,7 +276,7 @@ TEST(GltfScene, ChainOf5000NodesIsWalkedWithoutRecursion) {
   const auto scene = read_gltf_scene(folder.write("deep.glb", scene_file(nodes + R"({"mesh":0})", "0")));
   ASSERT_TRUE(scene) << scene.error().message;
   ASSERT_EQ(scene->instances.size(), 1u);
-  EXPECT_FLOAT_EQ(scene->instances[0].to_world[3].z, 2499.5f);
+  EXPECT_FLOAT_EQ(scene->instances[0].to_world[3].z + static_cast<float>(scene->origin_world.z), 2499.5f);
 }
 
 TEST(GltfScene, DeepJsonIsRefusedBeforeAnyRecursiveParser) {
@@ -350,6 +401,124 @@ TEST(GltfScene, AssetNamesAreUniqueAndFitForFiles) {
   std::vector<std::string> names;
   for (const GltfMesh& mesh : scene->meshes) names.push_back(mesh.asset_name);
   EXPECT_EQ(names, (std::vector<std::string>{"a_b", "a_b_2", "mesh_2", "_._x", "A_B_3"}));
+}
+
+TEST(GltfScene, MapCoordinatesLoseNothing) {
+  const auto near = read_gltf_scene(kCases / "g24_origin.glb"), far = read_gltf_scene(kCases / "g24_utm.glb");
+  ASSERT_TRUE(near && far);
+  EXPECT_EQ(near->origin_world, dvec3(0.0));
+  ASSERT_EQ(far->instances.size(), 1u);
+  const vec3 from_near = near->cameras[0].position - vec3(near->instances[0].to_world[3]);
+  const vec3 from_far = far->cameras[0].position - vec3(far->instances[0].to_world[3]);
+  EXPECT_LT(distance(from_near, from_far), 1e-6f);
+  const vec3 later = far->camera_at(0, 1).position - vec3(far->instances_at(1)[0].to_world[3]);
+  EXPECT_LT(distance(from_near, later), 1e-6f);
+  EXPECT_LT(glm::length(far->origin_world + dvec3(far->instances[0].to_world[3]) - dvec3(500000.25, 0, 4500000.5)),
+            1e-6);
+}
+
+TEST(GltfScene, SkinnedMeshesStandWhereTheirSkeletonIs) {
+  const auto scene = read_gltf_scene(kCases / "g09_skin.glb");
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->instances.size(), 1u);
+  EXPECT_LT(distance(scene->instances[0].to_world * vec4(0.5f, 0.5f, 0, 1), vec3(0.5f, 5.5f, 0)), 1e-5f);
+  ASSERT_EQ(scene->warnings.size(), 1u);
+  EXPECT_EQ(scene->warnings[0], "node 0 (figure): skinned; shown stiff, in its bind pose where its first joint is");
+  const auto mesh = read_source(kCases / "g09_skin.glb");
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  EXPECT_EQ(mesh->warnings, scene->warnings);
+  for (const dvec3& p : mesh->positions) {
+    EXPECT_NEAR(std::abs(p.x), 0.5, 1e-6);
+    EXPECT_NEAR(std::abs(p.y - 5), 0.5, 1e-6);
+  }
+}
+
+TEST(GltfScene, ASkinWithRandomBindMatricesStandsWhereItsNodeIs) {
+  const TemporaryFolder folder;
+  std::vector<float> matrix(16, 1e18f);
+  const auto file =
+      folder.write("a.glb", scene_file(R"({"name":"n","mesh":0,"skin":0,"translation":[1,0,0]},{})", "0,1",
+                                       R"("skins":[{"joints":[1],"inverseBindMatrices":1}])", raw<float>(matrix),
+                                       R"({"bufferView":1,"componentType":5126,"count":1,"type":"MAT4"})"));
+  const auto scene = read_gltf_scene(file);
+  const auto mesh = read_source(file);
+  ASSERT_TRUE(scene && mesh);
+  EXPECT_EQ(vec3(scene->instances[0].to_world[3]), vec3(1, 0, 0));
+  EXPECT_EQ(mesh->positions[0], dvec3(1, 0, 0));
+  EXPECT_NE(scene->warnings[0].find("no transform"), std::string::npos);
+  EXPECT_EQ(scene->warnings, mesh->warnings);
+}
+
+TEST(GltfScene, BrokenSkinsAndTexturesOfMaterialsAreRefused) {
+  const TemporaryFolder folder;
+  for (const char* members :
+       {R"("skins":[{"joints":[7]}])", R"("skins":[{"joints":[]}])",
+        R"("skins":[{"joints":[0],"inverseBindMatrices":9}])", R"("materials":[{"normalTexture":{"index":3}}])",
+        R"("materials":[{"emissiveTexture":{"index":3}}])"}) {
+    EXPECT_FALSE(read_gltf_scene(folder.write("bad.glb", scene_file(R"({"mesh":0})", "0", members)))) << members;
+  }
+  EXPECT_FALSE(read_gltf_scene(folder.write("bad.glb", scene_file(R"({"mesh":0,"skin":2})", "0"))));
+}
+
+TEST(GltfScene, HiddenNodesAndWhatIsBelowThemAreLeftOut) {
+  const TemporaryFolder folder;
+  const auto file = folder.write(
+      "a.glb", scene_file(R"({"mesh":0,"children":[1],"extensions":{"KHR_node_visibility":{"visible":false}}},
+                             {"mesh":0},{"mesh":0,"extensions":{"KHR_node_visibility":{"visible":true}}})",
+                          "0,2", R"("extensionsUsed":["KHR_node_visibility"])"));
+  const auto scene = read_gltf_scene(file);
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->instances.size(), 1u);
+  EXPECT_EQ(scene->instances[0].node, 2u);
+  EXPECT_TRUE(scene->warnings.empty());
+  const auto mesh = read_source(file);
+  ASSERT_TRUE(mesh);
+  EXPECT_EQ(mesh->face_count(), 1u);
+}
+
+/// The triangle with one morph target that lifts it by 2, and with lines.
+std::string morphed_file(const std::string& node_members) {
+  std::string file =
+      scene_file(fmt::format(R"({{"mesh":0{}}})", node_members), "0", "", raw<float>({0, 0, 2, 0, 0, 2, 0, 0, 2}),
+                 R"({"bufferView":1,"componentType":5126,"count":3,"type":"VEC3"})");
+  const std::string plain = R"({"attributes":{"POSITION":0}}]}])";
+  std::string json = file.substr(20);
+  const std::string targets =
+      R"({"attributes":{"POSITION":0},"targets":[{"POSITION":1}]},{"attributes":{"POSITION":0},"mode":1}],"weights":[0.5]}])";
+  json.replace(json.find(plain), plain.size(), targets);
+  const size_t end = json.find("BIN") - 4;  // the chunk's length stands before its name
+  return glb(json.substr(0, end), json.substr(end + 8));
+}
+
+TEST(GltfScene, MorphTargetsHaveTheirDefaultWeightsAndLinesAreSaid) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("a.glb", morphed_file(""));
+  const auto mesh = read_source(file);
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  ASSERT_EQ(mesh->positions.size(), 3u);
+  for (const dvec3& p : mesh->positions) EXPECT_EQ(p.z, 1.0);
+  EXPECT_EQ(mesh->warnings,
+            std::vector<std::string>{"mesh 0 primitive 1: points or lines; they have no surface, left out"});
+  const auto other = read_gltf_scene(folder.write("b.glb", morphed_file(R"(,"name":"face","weights":[1])")));
+  ASSERT_TRUE(other) << other.error().message;
+  EXPECT_EQ(other->warnings,
+            std::vector<std::string>{"node 0 (face): its own morph weights are ignored; its mesh's are shown"});
+}
+
+TEST(GltfScene, AnimatedLightsAreSaid) {
+  const TemporaryFolder folder;
+  std::string members = R"("extensionsUsed":["KHR_lights_punctual"],
+      "extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","name":"lamp"}]}},
+      "animations":[{"channels":[{"sampler":0,"target":{"node":0,"path":"translation"}}],
+                     "samplers":[{"input":1,"output":2}]}])";
+  const auto scene = read_gltf_scene(
+      folder.write("a.glb", scene_file(R"({"extensions":{"KHR_lights_punctual":{"light":0}}})", "0", members,
+                                       raw<float>({0, 1, 0, 0, 0, 1, 0, 0}),
+                                       R"({"bufferView":1,"componentType":5126,"count":2,"type":"SCALAR"},
+                             {"bufferView":1,"byteOffset":8,"componentType":5126,"count":2,"type":"VEC3"})")));
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_EQ(scene->lights.size(), 1u);
+  EXPECT_EQ(scene->warnings, std::vector<std::string>{"light lamp: it is animated; it stays where it is at time 0"});
 }
 
 }  // namespace

@@ -90,6 +90,26 @@ TEST_F(AssetLibrary, FailedBakeNamesTheMeshAndHowItEnded) {
   EXPECT_NE(find_or_bake_assets(scene_, options_).error().message.find("signal 9"), std::string::npos);
 }
 
+TEST_F(AssetLibrary, OneBrokenMeshIsAWarningAndTheOthersAreThere) {
+  std::vector<std::string> warnings;
+  options_.warning = [&](const std::string& line) { warnings.push_back(line); };
+  set_baker("case \"$*\" in *maple*) exit 1;; esac");
+  const auto folders = find_or_bake_assets(scene_, options_);
+  ASSERT_TRUE(folders) << folders.error().message;
+  EXPECT_EQ((*folders)[0], "");
+  EXPECT_EQ((*folders)[3].filename(), "ground.farfield");
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("mesh 0 \"maple\""), std::string::npos) << warnings[0];
+}
+
+TEST_F(AssetLibrary, ASceneOfBrokenMeshesAloneIsAnError) {
+  set_baker("exit 1");
+  const auto folders = find_or_bake_assets(scene_, options_);
+  ASSERT_FALSE(folders);
+  EXPECT_NE(folders.error().message.find("maple"), std::string::npos);
+  EXPECT_EQ(calls().size(), 2u);
+}
+
 TEST_F(AssetLibrary, MissingBakerIsAnError) {
   options_.baker = folder_.path() / "nobody";
   EXPECT_EQ(find_or_bake_assets(scene_, options_).error().code, ErrorCode::Io);
