@@ -57,7 +57,7 @@ class Mesh:
         corners, counts = _arrays.faces(self.faces, self.counts)
         ids = None if self.material_ids is None else _arrays.integers(self.material_ids, "material_ids").ravel()
 
-        def attribute(name: str, columns: int) -> tuple[np.ndarray, bool] | None:
+        def attribute(name: str, columns: int) -> tuple[npt.NDArray[Any], bool] | None:
             return _arrays.attribute(getattr(self, name), columns, len(points), corners, name)
 
         return {
@@ -162,12 +162,13 @@ class Asset:
     def __init__(self, folder: Path, materials: MaterialFunction | None = None):
         self.folder = os.fspath(folder)
         self.materials = materials
-        self._info = info(self.folder)
+        self._info: dict[str, Any] = info(self.folder)
 
     @property
     def levels(self) -> list[dict[str, Any]]:
         """The stored levels, finest first."""
-        return self._info["levels"]
+        levels: list[dict[str, Any]] = self._info["levels"]
+        return levels
 
     def info(self) -> dict[str, Any]:
         return self._info
@@ -192,7 +193,8 @@ def open(folder: Path, materials: MaterialFunction | None = None) -> Asset:
 
 def info(folder: Path) -> dict[str, Any]:
     """What `farfield info --json` says: the asset's levels, with what they hold, cost and (once evaluated) miss."""
-    return json.loads(_farfield.info(os.fspath(folder)))
+    said: dict[str, Any] = json.loads(_farfield.info(os.fspath(folder)))
+    return said
 
 
 def evaluate(
@@ -213,7 +215,8 @@ def evaluate(
     """
     options = {"first_level": levels[0], "last_level": levels[1], "views": views, "samples": samples, "seed": seed}
     text = _farfield.evaluate(os.fspath(asset), "" if source is None else os.fspath(source), options, progress)
-    return json.loads(text)
+    figures: dict[str, Any] = json.loads(text)
+    return figures
 
 
 def render(
@@ -245,6 +248,7 @@ def render(
     name of an EXR a latitude-longitude picture. channels: also "A", "Z", "albedo.R", "N.X", "lod.level" and so on.
     transparent: the light itself is not seen. budget: bytes for the assets. The same arguments give the same picture.
     """
+    placed: list[tuple[Path, npt.ArrayLike]]
     placed = [(scene, np.eye(4))] if isinstance(scene, (str, os.PathLike)) else list(scene)
     arrays = [
         (os.fspath(asset), _arrays.matrix(to_world, f"instance {i}"), _wrapped(getattr(asset, "materials", None)))
@@ -264,7 +268,10 @@ def render(
 
 
 def _wrapped(function: MaterialFunction | None) -> MaterialFunction | None:
-    return None if function is None else lambda query: function(query)
+    if function is None:
+        return None
+    ask = function
+    return lambda query: ask(query)  # of one kind, whatever is callable
 
 
 def _warn(text: str) -> None:

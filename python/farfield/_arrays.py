@@ -7,13 +7,16 @@ import os
 from typing import Any, Sequence
 
 import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
 
 _SRGB = np.arange(256) / 255.0
 _SRGB_TO_LINEAR = np.where(_SRGB <= 0.04045, _SRGB / 12.92, ((_SRGB + 0.055) / 1.055) ** 2.4).astype(np.float32)
 _COLOR_TEXTURES = ("base_color_texture", "emission_texture")
 
 
-def rows(values: Any, columns: int, what: str) -> np.ndarray:
+def rows(values: Any, columns: int, what: str) -> Array:
     """(n, columns) float64."""
     array = np.asarray(values, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != columns:
@@ -21,7 +24,7 @@ def rows(values: Any, columns: int, what: str) -> np.ndarray:
     return np.ascontiguousarray(array)
 
 
-def integers(values: Any, what: str) -> np.ndarray:
+def integers(values: Any, what: str) -> Array:
     """Whole numbers of any shape as int64; 1.0 is one, 1.5 is refused."""
     array = np.asarray(values)
     if array.size == 0:
@@ -31,7 +34,7 @@ def integers(values: Any, what: str) -> np.ndarray:
     return np.ascontiguousarray(array, dtype=np.int64)
 
 
-def faces(values: Any, counts: Any) -> tuple[np.ndarray, np.ndarray | None]:
+def faces(values: Any, counts: Any) -> tuple[Array, Array | None]:
     """Corners, face after face, and how many each face has (None: three)."""
     if counts is not None:
         return integers(values, "faces").ravel(), integers(counts, "counts").ravel()
@@ -50,7 +53,7 @@ def faces(values: Any, counts: Any) -> tuple[np.ndarray, np.ndarray | None]:
     return array.ravel(), np.full(len(array), array.shape[1], dtype=np.int64)
 
 
-def attribute(values: Any, columns: int, points: int, corners: np.ndarray, what: str) -> tuple[np.ndarray, bool] | None:
+def attribute(values: Any, columns: int, points: int, corners: Array, what: str) -> tuple[Array, bool] | None:
     """(float32 rows, whether they belong to points and not to corners). Three axes are corners: (n, k, columns)."""
     if values is None:
         return None
@@ -74,7 +77,7 @@ def attribute(values: Any, columns: int, points: int, corners: np.ndarray, what:
     raise ValueError(f"{what}: {len(array)} rows for {points} points and {len(corners)} corners")
 
 
-def matrix(values: Any, what: str) -> np.ndarray:
+def matrix(values: Any, what: str) -> Array:
     """The upper 3 x 4 part of a transform, for column vectors: the last column is the translation."""
     array = np.asarray(values, dtype=np.float64)
     if array.shape not in ((4, 4), (3, 4)):
@@ -84,7 +87,7 @@ def matrix(values: Any, what: str) -> np.ndarray:
     return np.ascontiguousarray(array[:3])
 
 
-def image(values: Any, is_color: bool, what: str) -> str | np.ndarray:
+def image(values: Any, is_color: bool, what: str) -> str | Array:
     """The name of a file, or (height, width, 4) float32. Colours of 8 bits are sRGB, as in image files."""
     if isinstance(values, (str, os.PathLike)):
         return os.fspath(values)
@@ -134,7 +137,7 @@ def materials(values: Any) -> list[dict[str, Any]] | Any:
     return [material(fields) for fields in values]
 
 
-def instances(values: Sequence[tuple[int, Any]] | None, mesh_count: int) -> list[tuple[int, np.ndarray]]:
+def instances(values: Sequence[tuple[int, Any]] | None, mesh_count: int) -> list[tuple[int, Array]]:
     out = []
     for i, (mesh, to_asset) in enumerate(values or []):
         if not 0 <= mesh < mesh_count:

@@ -208,6 +208,17 @@ class Materials(InAFolder):
         np.testing.assert_allclose(picture[0].mean(0), [0.5, 0, 0], atol=0.03)
         np.testing.assert_allclose(picture[7].mean(0), [0, 0, 0.5], atol=0.03)
 
+    def test_a_function_that_says_what_a_description_says_looks_the_same_from_afar(self):
+        points, quads, _ = quad_grid(40)
+        mesh = farfield.Mesh(points + 0.05 * np.random.default_rng(1).random(points.shape), quads)
+        other = self.folder / "other.farfield"
+        farfield.bake(mesh, self.out, materials=[{"base_color": (0.5, 0.25, 0.125)}], **SMALL)
+        report = farfield.bake(mesh, other, materials=lambda query: {"diffuse": (0.5, 0.25, 0.125)}, **SMALL)
+        root = report["levels"][-1]["level"]
+        self.assertGreater(root, 0)
+        described, asked = (self.front(asset, level=root) for asset in (self.out, other))
+        np.testing.assert_allclose(asked.mean((0, 1)), described.mean((0, 1)), rtol=0.01)
+
     def test_what_a_function_raises_comes_out(self):
         def broken(query):
             raise ZeroDivisionError("no look")
