@@ -148,7 +148,8 @@ struct BakeInput {
   /// grey.
   std::vector<BakeMaterial> materials;
   /// The host's own materials: if set, `materials` give names only, and need not be complete. Called from many threads
-  /// at once. The same function goes to Runtime::open_asset(), unless the host shades level 0 by itself.
+  /// at once. Faces are numbered on from mesh to mesh, in the order of the instances. The same function goes to
+  /// Runtime::open_asset(), unless the host shades level 0 by itself (docs/materials.md).
   MaterialFunction material_function;
   /// Stands for the answers of material_function: a bake of the same input under the same key is taken as the same.
   /// Empty: whether there is something to do cannot be told, so every call bakes.

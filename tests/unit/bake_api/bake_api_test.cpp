@@ -168,6 +168,24 @@ TEST_F(BakeApi, AFunctionIsBakedAnewUnlessAKeyStandsForIt) {
   EXPECT_TRUE(bake_meshes(input, out(), small_settings()).value().is_up_to_date);
 }
 
+TEST_F(BakeApi, AFunctionThatSaysWhatDescriptionsSayBakesToTheSameLevels) {
+  BakeInput described = tree_.input(), asked = tree_.input();
+  asked.materials.clear();
+  asked.material_function = [colors = described.materials](const MaterialQuery& query) {
+    MaterialSample sample;
+    sample.diffuse = colors[query.material].base_color;
+    return sample;
+  };
+  ASSERT_TRUE(bake_meshes(described, out("described"), small_settings()));
+  ASSERT_TRUE(bake_meshes(asked, out("asked"), small_settings()));
+  auto of_described = level_bytes(out("described")), of_asked = level_bytes(out("asked"));
+  // Level 0 keeps where its faces come from only if somebody can be asked.
+  of_described.erase("level_0.ffl");
+  of_asked.erase("level_0.ffl");
+  ASSERT_FALSE(of_described.empty());
+  EXPECT_EQ(of_described, of_asked);
+}
+
 TEST_F(BakeApi, TellsHowFarItIs) {
   BakeSettings settings = small_settings();
   std::vector<double> done;
