@@ -132,28 +132,6 @@ Metadata view_metadata(Metadata metadata, const LevelPlan& plan, const OrthoView
   return metadata;
 }
 
-/// The environment as a latitude-longitude picture (layout: Environment::from_image), sun disc included: every texel is
-/// a mean, so that it holds the disc's light although it is smaller than a texel.
-Image environment_image(const Environment& environment) {
-  constexpr int kWidth = 1024, kHeight = 512, kSubsamples = 8;
-  Image image(kWidth, kHeight, {"R", "G", "B"});
-  for (int y = 0; y < kHeight; ++y)
-    for (int x = 0; x < kWidth; ++x) {
-      vec3 sum(0.0f);
-      for (int j = 0; j < kSubsamples; ++j)
-        for (int i = 0; i < kSubsamples; ++i) {
-          const float u = (static_cast<float>(x) + (static_cast<float>(i) + 0.5f) / kSubsamples) / kWidth;
-          const float v = (static_cast<float>(y) + (static_cast<float>(j) + 0.5f) / kSubsamples) / kHeight;
-          const float theta = v * kPi, phi = (u - 0.5f) * 2.0f * kPi;
-          sum += environment.radiance(
-              {std::sin(theta) * std::sin(phi), std::cos(theta), -std::sin(theta) * std::cos(phi)});
-        }
-      sum *= 1.0f / (kSubsamples * kSubsamples);
-      for (int c = 0; c < 3; ++c) image.pixel(x, y)[c] = sum[c];
-    }
-  return image;
-}
-
 Result<void> make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -197,7 +175,7 @@ class Evaluator {
   Result<void> prepare_images() const {
     if (options_.images.empty()) return {};
     FARFIELD_TRY(make_folder(options_.images));
-    return write_exr(options_.images / "environment.exr", environment_image(lights_.environment), light_metadata_);
+    return write_exr(options_.images / "environment.exr", lights_.environment.to_image(1024), light_metadata_);
   }
 
   Result<LevelEvaluation> evaluate_level(const LevelPlan& plan) {

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <vector>
 
 #include "base/result.h"
@@ -230,6 +231,46 @@ Result<Environment> Environment::from_file(const std::filesystem::path& path, fl
   if (!environment)
     return make_error(environment.error().code, fmt::format("{}: {}", path.string(), environment.error().message));
   return environment;
+}
+
+namespace {
+
+// Of what fills the sphere: each pixel the mean over a lattice of directions.
+Image background_image(const LatLongGrid& grid, const std::function<vec3(const vec3&)>& radiance) {
+  Image image(grid.width, grid.height, {"R", "G", "B"});
+  constexpr float kStep = 1.0f / kSkySubsamples;
+  for (int y = 0; y < grid.height; ++y) {
+    for (int x = 0; x < grid.width; ++x) {
+      vec3 sum(0.0f);
+      for (int j = 0; j < kSkySubsamples; ++j)
+        for (int i = 0; i < kSkySubsamples; ++i)
+          sum += radiance(grid.direction(float(x) + (float(i) + 0.5f) * kStep, float(y) + (float(j) + 0.5f) * kStep));
+      sum *= kStep * kStep;
+      std::copy_n(&sum.x, 3, image.pixel(x, y));
+    }
+  }
+  return image;
+}
+
+// Spreads a disc's light over the pixels that it meets, as points: none of it is lost, however small it is.
+void add_disc(const SunDisc& disc, const LatLongGrid& grid, Image& image) {
+  constexpr int kPoints = 1 << 14;
+  Rng rng(0);
+  for (int i = 0; i < kPoints; ++i) {
+    const size_t cell = grid.cell(disc.sample(rng));
+    const auto solid_angle = static_cast<float>(grid.solid_angle(static_cast<int>(cell) / grid.width));
+    const vec3 share = disc.radiance * (disc.solid_angle / (kPoints * solid_angle));
+    for (size_t c = 0; c < 3; ++c) image.values[3 * cell + c] += share[static_cast<int>(c)];
+  }
+}
+
+}  // namespace
+
+Image Environment::to_image(int width) const {
+  const LatLongGrid grid{std::max(width, 2), std::max(width, 2) / 2};
+  Image image = background_image(grid, [this](const vec3& wi) { return impl_->background(wi); });
+  for (const SunDisc& disc : impl_->discs) add_disc(disc, grid, image);
+  return image;
 }
 
 vec3 Environment::radiance(const vec3& wi) const {

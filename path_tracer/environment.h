@@ -66,6 +66,10 @@ class Environment {
   /// This and more light. Lights without irradiance are left out.
   Environment with(std::span<const DistantLight> lights) const;
 
+  /// The layout that from_image() takes, width x width / 2 pixels (at least 2 wide). Each is the mean over its patch,
+  /// so that a sun smaller than a pixel keeps its light.
+  Image to_image(int width) const;
+
   /// Radiance that arrives from unit direction `wi`.
   vec3 radiance(const vec3& wi) const;
   /// Draws a direction; black environments give pdf 0. choice: uniform in [0, 1), says whether the sun's disc or the

@@ -22,5 +22,6 @@ void add_verify_command(CLI::App& app, Action& action);
 void add_evaluate_command(CLI::App& app, Action& action);
 void add_render_command(CLI::App& app, Action& action);
 void add_shot_command(CLI::App& app, Action& action);
+void add_sky_command(CLI::App& app, Action& action);
 
 }  // namespace farfield::tool

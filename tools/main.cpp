@@ -32,6 +32,7 @@ int run(int argc, char** argv) {
   tool::add_evaluate_command(app, action);
   tool::add_render_command(app, action);
   tool::add_shot_command(app, action);
+  tool::add_sky_command(app, action);
 
   try {
     app.parse(argc, argv);

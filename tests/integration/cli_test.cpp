@@ -68,7 +68,7 @@ void expect_quiet_success(const ProcessOutput& output) {
   EXPECT_EQ(output.err, "");
 }
 
-const std::vector<std::string> kCommands = {"bake", "info", "verify", "evaluate", "render", "shot"};
+const std::vector<std::string> kCommands = {"bake", "info", "verify", "evaluate", "render", "shot", "sky"};
 
 TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
   const std::vector<std::vector<std::string>> flags = {
@@ -77,7 +77,8 @@ TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
       {},
       {"--source", "--levels", "--views", "--spp", "--json", "--sheet", "--images"},
       {"--frame", "--size", "--spp", "--budget", "--assets", "--blend", "--lod-scale", "--full-detail", "--output"},
-      {"--frames", "--size", "--spp", "--budget", "--assets", "--blend", "--lod-scale", "--full-detail", "--output"}};
+      {"--frames", "--size", "--spp", "--budget", "--assets", "--blend", "--lod-scale", "--full-detail", "--output"},
+      {"--output", "--width"}};
   for (size_t i = 0; i < kCommands.size(); ++i) {
     const ProcessOutput help = farfield({kCommands[i], "--help"});
     EXPECT_EQ(help.exit_code, 0) << kCommands[i];
@@ -420,6 +421,20 @@ TEST(Warnings, OfABrokenMeshNameItAndTheSceneIsRendered) {
   const Json report = Json::parse(contents(folder / "shot/shot.json"));
   ASSERT_EQ(report["warnings"].size(), 1u) << report["warnings"];
   EXPECT_NE(report["warnings"][0].get<std::string>().find("\"torn\""), std::string::npos);
+}
+
+TEST_F(WholeRoad, TheSkyIsAPictureThatLightsASceneAlike) {
+  test::write_bush_scene(path("scene.gltf"), 120);
+  expect_quiet_success(farfield({"sky", path("scene.gltf"), "-o", path("sky.exr")}));
+  expect_quiet_success(farfield({"sky", "-o", path("default.exr"), "--width", "64"}));
+  EXPECT_GT(fs::file_size(path("sky.exr")), fs::file_size(path("default.exr")));
+  const ProcessOutput lit =
+      farfield({"render", path("scene.gltf"), "--environment", path("default.exr"), "--size", "16x8", "--finest-grid",
+                "32", "--assets", path("assets"), "-o", path("lit.exr")});
+  EXPECT_EQ(lit.exit_code, 0);
+  EXPECT_NE(lit.err.find("replaces the scene's directional lights"), std::string::npos) << lit.err;
+  expect_one_line_error(farfield({"sky", path("no.glb"), "-o", path("a.exr")}), path("no.glb"));
+  expect_one_line_error(farfield({"sky", "-o", path("a.png")}), ".exr");
 }
 
 TEST(Interrupt, ABakeStopsInOrderAndGoesOnLater) {

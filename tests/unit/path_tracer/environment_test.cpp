@@ -230,6 +230,29 @@ TEST(Environment, ReadsRadianceHdrFiles) {
   }
 }
 
+TEST(Environment, PicturesOfLightHoldAllOfIt) {
+  // A sun of half a degree in pixels of three: seen from the picture, surfaces get the same light.
+  for (const auto& [name, environment] : sample_environments()) {
+    const auto picture = Environment::from_image(environment.to_image(128));
+    ASSERT_TRUE(picture);
+    for (const vec3& normal : {vec3(0, 1, 0), vec3(0.6f, 0.48f, 0.64f), vec3(0, -1, 0)}) {
+      const auto irradiance = [&](const Environment& light) {
+        Rng rng(8);
+        return estimate(100000, [&] {
+          const EnvironmentSample sample = light.sample(rng);
+          return sample.pdf > 0 ? sample.radiance * (std::max(glm::dot(sample.wi, normal), 0.0f) / sample.pdf)
+                                : vec3(0.0f);
+        });
+      };
+      const Estimate ours = irradiance(environment), theirs = irradiance(*picture);
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(theirs.mean[c], ours.mean[c],
+                    0.01 * ours.mean[c] + kSigmas * std::hypot(ours.error[c], theirs.error[c]))
+            << name;
+    }
+  }
+}
+
 TEST(Environment, SkyAndGroundMeetWithoutAnEdge) {
   const Environment environment = Environment::sun_sky(default_sun_sky());
   for (int i = 0; i < 16; ++i) {
