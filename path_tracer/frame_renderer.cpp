@@ -59,13 +59,14 @@ std::string make_fingerprint(const RenderOptions& options, std::span<const fs::p
   return text;
 }
 
-Metadata frame_metadata(const RenderOptions& options, const Camera& camera, int frame) {
+// origin: GltfScene::origin_world; positions in files are those of the scene's file.
+Metadata frame_metadata(const RenderOptions& options, const Camera& camera, const dvec3& origin, int frame) {
   const TessellationCamera pixel = camera.tessellation();
   return {
       {"camera.forward", camera.forward()},
       {"camera.pixel_spread", pixel.pixel_spread},
       {"camera.pixel_width", pixel.pixel_width},
-      {"camera.position", camera.position()},
+      {"camera.position", vec3(dvec3(camera.position()) + origin)},
       {"camera.up", camera.up()},
       {"farfield.budget", fmt::format("{}", options.budget_bytes)},
       {"farfield.frame", frame},
@@ -78,9 +79,9 @@ Metadata frame_metadata(const RenderOptions& options, const Camera& camera, int 
 }
 
 // With ids: whose they are.
-Metadata frame_metadata(const RenderOptions& options, const Camera& camera, int frame,
+Metadata frame_metadata(const RenderOptions& options, const Camera& camera, const dvec3& origin, int frame,
                         std::span<const GltfInstance> instances) {
-  Metadata metadata = frame_metadata(options, camera, frame);
+  Metadata metadata = frame_metadata(options, camera, origin, frame);
   if (!options.cryptomatte) return metadata;
   std::set<std::string> names;
   for (const GltfInstance& instance : instances) names.insert(object_name(instance));
@@ -176,7 +177,7 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     report.frames.push_back(std::move(frame));
     report.peak_accounted_bytes = std::max(report.peak_accounted_bytes, session->stats().peak_accounted_bytes);
     report.peak_rss_bytes = memory.peak_bytes();
-    const Metadata metadata = frame_metadata(options_, camera, frames[i], session_instances);
+    const Metadata metadata = frame_metadata(options_, camera, scene_.origin_world, frames[i], session_instances);
     report.warnings = warnings_.lines();
     if (auto taken = sink(film.image(), metadata, report); !taken) return tl::unexpected(taken.error());
   }
