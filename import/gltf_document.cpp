@@ -378,6 +378,10 @@ Result<GltfDocument> open_gltf(std::span<const unsigned char> bytes, const fs::p
     return make_error(ErrorCode::Unsupported,
                       fmt::format("{}: requires {}, which is not supported; export without it", document.name, names));
   }
+  if (document.model.asset.version.starts_with("1")) {
+    return make_error(ErrorCode::Unsupported,
+                      fmt::format("{}: glTF {}; convert it to glTF 2.0", document.name, document.model.asset.version));
+  }
   if (!ok) return document.bad(first_line(error));
   document.files = std::move(access.files);
   document.warnings = warn_of_unknown_extensions(document.model);

@@ -4,6 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
+#include <set>
+#include <system_error>
 
 #include "base/hash.h"
 #include "import/read_file.h"
@@ -18,12 +21,35 @@ std::string with_slashes(std::string_view name) {
   return text;
 }
 
+std::string lower_case(std::string_view text) {
+  std::string out(text);
+  for (char& c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return out;
+}
+
 Result<std::vector<unsigned char>> ImageFiles::read_noted(const fs::path& path) {
   auto bytes = read_file(path);
   const fs::path relative = path.lexically_relative(folder_);
   mesh_.source_files.push_back(
       {(relative.empty() ? path : relative).generic_string(), bytes ? hash_values<unsigned char>(*bytes) : 0});
   return bytes;
+}
+
+fs::path find_by_last_name(const fs::path& folder, const fs::path& named) {
+  const fs::path exact = folder / named.filename();
+  if (exact != named && fs::is_regular_file(exact)) return exact;
+  const std::string wanted = lower_case(named.filename().string());
+  std::error_code error;
+  for (const fs::path& place : {named.parent_path(), folder}) {
+    std::set<fs::path> fitting;  // in order, so that the same one is taken everywhere
+    for (const auto& entry : fs::directory_iterator(place, error)) {
+      if (lower_case(entry.path().filename().string()) == wanted && entry.is_regular_file(error)) {
+        fitting.insert(entry.path());
+      }
+    }
+    if (!fitting.empty() && *fitting.begin() != named) return *fitting.begin();
+  }
+  return {};
 }
 
 namespace {
@@ -45,8 +71,8 @@ std::shared_ptr<const Texture> ImageFiles::read(const fs::path& folder, std::str
   if (!is_new) return found->second;
   fs::path path = named;
   auto bytes = read_noted(named);
-  if (!bytes && fs::is_regular_file(folder / named.filename()) && folder / named.filename() != named) {
-    path = folder / named.filename();
+  if (const fs::path other = bytes ? fs::path() : find_by_last_name(folder, named); !other.empty()) {
+    path = other;
     bytes = read_noted(path);
     mesh_.warnings.push_back(fmt::format("texture {}: not there; {} is taken", named.string(), path.string()));
   }

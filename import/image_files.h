@@ -38,4 +38,10 @@ class ImageFiles {
 /// A file name as exporters on Windows write it, with the slashes of this system.
 std::string with_slashes(std::string_view name);
 
+/// Where a file that is not at `named` may be meant: `folder` has its last part, as paths of other computers do, or its
+/// name in other letters, which is the same file on Windows and Macs. Empty if nowhere.
+std::filesystem::path find_by_last_name(const std::filesystem::path& folder, const std::filesystem::path& named);
+
+std::string lower_case(std::string_view text);
+
 }  // namespace farfield

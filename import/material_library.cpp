@@ -53,7 +53,12 @@ bool is_mask(const Texture& image, float cutoff) {
 }  // namespace
 
 void MaterialLibraries::load(std::string_view names) {
-  if (load_file(folder_ / with_slashes(names))) return;
+  const fs::path named = folder_ / with_slashes(names);
+  if (load_file(named)) return;
+  if (const fs::path other = find_by_last_name(folder_, named); !other.empty() && load_file(other)) {
+    warn(fmt::format("material library {}: not there; {} is taken", names, other.string()));
+    return;
+  }
   TextCursor words(names);
   for (auto word = words.word(); !word.empty(); word = words.word()) {
     if (!load_file(folder_ / with_slashes(word))) warn(fmt::format("material library {} cannot be read", word));
@@ -92,6 +97,14 @@ Result<void> MaterialLibraries::finish() {
   }
   for (const auto& [name, index] : by_name_) {
     if (name.empty() || latest.contains(name)) continue;
+    const auto similar =
+        std::ranges::find_if(latest, [&](const auto& entry) { return lower_case(entry.first) == lower_case(name); });
+    if (similar != latest.end()) {
+      warn(fmt::format("material {} is taken for {}, which differs in upper and lower case", name, similar->first));
+      mesh_.materials[index] = convert(*similar->second, uv_[index]);
+      defined_.insert(index);
+      continue;
+    }
     warn(fmt::format("material {} is not in any library that was read; default grey", name));
   }
   keep_what_would_vanish();

@@ -4,20 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <set>
 
+#include "import/image_files.h"
 #include "import/text_cursor.h"
 
 namespace farfield {
 namespace {
-
-std::string lower_case(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return out;
-}
 
 bool is_one_of(std::string_view word, std::initializer_list<std::string_view> words) {
   return std::find(words.begin(), words.end(), word) != words.end();
@@ -272,7 +266,8 @@ class MtlReader {
 }  // namespace
 
 MtlFile read_mtl(std::string_view text, const std::string& name) {
-  return MtlReader(without_byte_order_mark(text), name).read();
+  std::string storage;
+  return MtlReader(with_line_ends(without_byte_order_mark(text), storage), name).read();
 }
 
 }  // namespace farfield

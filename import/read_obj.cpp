@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <map>
 
 #include "base/index.h"
@@ -41,6 +42,16 @@ class ObjReader {
   }
 
  private:
+  /// What is to be said once, however often it is met.
+  struct Ignored {
+    size_t count = 0;
+    const char* at = nullptr;  ///< in the text, where it stands first
+  };
+
+  static void note(Ignored& ignored, const char* at) {
+    if (ignored.count++ == 0) ignored.at = at;
+  }
+
   void read_line() {
     const std::string_view keyword = text_.word();
     if (keyword == "v")
@@ -49,7 +60,7 @@ class ObjReader {
       read_uv();
     else if (keyword == "vn")
       read_normal();
-    else if (keyword == "f")
+    else if (keyword == "f" || keyword == "fo")  // as it was called once
       read_face();
     else if (keyword == "s")
       read_smoothing_group();
@@ -57,6 +68,8 @@ class ObjReader {
       material_ = materials_.find(text_.rest_of_line());
     else if (keyword == "mtllib")
       materials_.load(text_.rest_of_line());
+    else if (keyword == "#MRGB")
+      read_polypaint();
     else if (keyword.starts_with('#'))
       text_.rest_of_line();  // comments are not continued: they may end with a Windows path
     else
@@ -66,8 +79,7 @@ class ObjReader {
   /// Names of groups and objects mean nothing here; whatever else is left out is counted, to be said once.
   void read_without_effect(std::string_view keyword) {
     if (!keyword.empty() && keyword != "g" && keyword != "o") {
-      Ignored& ignored = ignored_[std::string(keyword)];
-      if (ignored.count++ == 0) ignored.at = keyword.data();
+      note(ignored_[std::string(keyword)], keyword.data());
     }
     skip_line();
   }
@@ -95,6 +107,7 @@ class ObjReader {
   }
 
   void read_position() {
+    const char* line = text_.position();
     double v[7];
     int count = 0;
     while (count < 7 && number(v[count])) ++count;
@@ -102,12 +115,24 @@ class ObjReader {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     // A line that is no position still counts, or all later indices would be off by one.
     mesh_.positions.push_back(count >= 3 ? dvec3(v[0], v[1], v[2]) : dvec3(nan));
+    if (count < 3) note(no_position_, line);
     if (count < 6) return;
     // x y z r g b, or x y z w r g b
     colors_.resize(mesh_.positions.size(), vec3(1.0f));
     for (int c = 0; c < 3; ++c) {
-      colors_.back()[c] = srgb_to_linear(
-          static_cast<float>(std::isfinite(v[count - 3 + c]) ? std::clamp(v[count - 3 + c], 0.0, 1.0) : 0.0));
+      const double value = v[count - 3 + c];
+      colors_.back()[c] = std::isfinite(value) && value > 0 ? static_cast<float>(std::min(value, 1e30)) : 0.0f;
+    }
+  }
+
+  /// ZBrush paints vertices in comments: after each block of vertices their masks and colours, as MMRRGGBB.
+  void read_polypaint() {
+    for (std::string_view digits = text_.rest_of_line(); digits.size() >= 8; digits.remove_prefix(8)) {
+      uint32_t color = 0;
+      const auto [stop, error] = std::from_chars(digits.data(), digits.data() + 8, color, 16);
+      if (error != std::errc() || stop != digits.data() + 8) return;
+      if (painted_.size() >= mesh_.positions.size()) return;  // colours of no vertex
+      painted_.push_back(vec3((color >> 16) & 255, (color >> 8) & 255, color & 255) / 255.0f);
     }
   }
 
@@ -239,8 +264,18 @@ class ObjReader {
     smooth_corner_normals(mesh_, face_group_);
   }
 
+  /// sRGB. Scanners also write 0 .. 255.
   void attach_colors() {
+    if (colors_.empty()) colors_ = std::move(painted_);
     if (colors_.empty()) return;
+    float most = 0;
+    for (const vec3& color : colors_) most = std::max({most, color.x, color.y, color.z});
+    constexpr float kBrightest = 8;  // no colour up to 1 is above; what is 0 .. 255 with no more than this is black
+    const float white = most > kBrightest ? 255.0f : 1.0f;
+    if (white > 1) mesh_.warnings.push_back("vertex colours are 0 .. 255; read as such");
+    for (vec3& color : colors_) {
+      for (int c = 0; c < 3; ++c) color[c] = srgb_to_linear(std::min(color[c] / white, 1.0f));
+    }
     colors_.resize(mesh_.positions.size(), vec3(1.0f));
     mesh_.corner_color.reserve(mesh_.corner_count());
     for (const uint32_t vertex : mesh_.corner_position) mesh_.corner_color.emplace_back(colors_[vertex], 1.0f);
@@ -249,6 +284,10 @@ class ObjReader {
   }
 
   void say_what_was_ignored() {
+    if (no_position_.count > 0) {
+      mesh_.warnings.push_back(fmt::format("line {}: v without three numbers (a decimal comma?), {} such lines",
+                                           line_of(no_position_.at), no_position_.count));
+    }
     for (const auto& [keyword, ignored] : ignored_) {
       const char* what = keyword == "l" ? " (lines)" : keyword == "p" ? " (points)" : "";
       mesh_.warnings.push_back(
@@ -258,11 +297,6 @@ class ObjReader {
   }
 
   size_t line_of(const char* at) const { return 1 + static_cast<size_t>(std::count(begin_, at, '\n')); }
-
-  struct Ignored {
-    size_t count = 0;
-    const char* at = nullptr;  ///< in the text, where it stands first
-  };
 
   const char* begin_;
   TextCursor text_;
@@ -275,13 +309,20 @@ class ObjReader {
   std::vector<uint32_t> corner_uv_index_, corner_normal_index_;
   uint32_t smoothing_group_ = 0;
   std::vector<uint32_t> face_group_;
+  std::vector<vec3> painted_;  ///< by ZBrush
+  Ignored no_position_;
   std::map<std::string, Ignored> ignored_;  ///< by keyword
 };
 
 }  // namespace
 
 Result<SourceMesh> read_obj(std::span<const unsigned char> bytes, const fs::path& path) {
-  return ObjReader({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, path).read();
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff")) {
+    return make_error(ErrorCode::Unsupported, fmt::format("{}: text in UTF-16; save it as UTF-8", path.string()));
+  }
+  std::string storage;
+  return ObjReader(with_line_ends(without_byte_order_mark(text), storage), path).read();
 }
 
 }  // namespace farfield

@@ -127,7 +127,7 @@ class PlyReader {
     attach_uvs();
     FARFIELD_TRY(attach_textures());
     attach_colors();
-    if (!ignored_.empty()) warn(fmt::format("{}: ignored", fmt::join(ignored_, ", ")));
+    say_what_was_ignored();
     return std::move(mesh_);
   }
 
@@ -136,6 +136,16 @@ class PlyReader {
     return make_error(ErrorCode::BadFile, fmt::format("{}: {}", name_, what));
   }
   void warn(std::string text) { mesh_.warnings.push_back(std::move(text)); }
+
+  void say_what_was_ignored() {
+    if (mesh_.face_count() == 0)
+      warn(fmt::format("{} points without faces; only surfaces are read", mesh_.positions.size()));
+    if (ignored_.empty()) return;
+    constexpr size_t kNamed = 8;  // splats have sixty
+    const auto end = std::next(ignored_.begin(), static_cast<ptrdiff_t>(std::min(kNamed, ignored_.size())));
+    const std::string more = ignored_.size() > kNamed ? fmt::format(" and {} more", ignored_.size() - kNamed) : "";
+    warn(fmt::format("{}{}: ignored", fmt::join(ignored_.begin(), end, ", "), more));
+  }
 
   Result<void> read_element(const PlyElement& element, PlyValues& values) {
     uint64_t bytes = 0;
@@ -146,9 +156,7 @@ class PlyReader {
     if (element.properties.empty()) return {};  // any count of nothing
     if (element.name == "vertex") return read_vertices(element, values);
     if (element.name == "face") return read_faces(element, values);
-    if (element.name == "tristrips") {
-      return make_error(ErrorCode::Unsupported, fmt::format("{}: triangle strips; save it with faces", name_));
-    }
+    if (element.name == "tristrips") return read_strips(element, values);
     if (element.count > 0) ignored_.insert(fmt::format("{} of '{}'", element.count, element.name));
     for (uint64_t i = 0; i < element.count; ++i) {
       for (const PlyProperty& p : element.properties) {
@@ -271,6 +279,31 @@ class PlyReader {
     return {};
   }
 
+  /// As the Stanford scans have them: lists of vertices, -1 between strips. Every second triangle is turned around.
+  Result<void> read_strips(const PlyElement& element, PlyValues& values) {
+    for (uint64_t i = 0; i < element.count; ++i) {
+      for (const PlyProperty& p : element.properties) {
+        if (!read_value(p, values)) return cut_short(element, i);
+        if (!is_indices(p)) continue;
+        const std::vector<double> strip = std::move(list_);
+        size_t begin = 0;
+        for (size_t at = 0; at < strip.size(); ++at) {
+          if (strip[at] < 0) {
+            begin = at + 1;
+          } else if (at >= begin + 2) {
+            const size_t turn = (at - begin) % 2;
+            list_ = {strip[at - 2], strip[at - 1 + turn], strip[at - turn]};
+            FARFIELD_TRY(add_corners(mesh_.face_count()));
+            mesh_.face_begin.push_back(static_cast<uint32_t>(mesh_.corner_count()));
+            mesh_.face_material.push_back(0);
+          }
+        }
+      }
+    }
+    if (mesh_.corner_count() > UINT32_MAX) return bad("more than 2^32 face corners");
+    return {};
+  }
+
   Result<void> add_corners(uint64_t face) {
     for (const double index : list_) {
       // Vertices may come after the faces: only what no vertex count can make right is refused here.
@@ -381,12 +414,13 @@ class PlyReader {
       return;
     }
     std::string note;
-    if (!face_colors_.values.empty()) {
+    // Strips, or a second list of faces, may have none.
+    if (face_colors_.values.size() == mesh_.face_count()) {
       const auto colors = face_colors_.to_linear(note);
       for (size_t face = 0; face < mesh_.face_count(); ++face) {
         mesh_.corner_color.resize(mesh_.face_begin[face + 1], vec4(colors[face], 1.0f));
       }
-    } else {
+    } else if (!vertex_colors_.values.empty()) {
       const auto colors = vertex_colors_.to_linear(note);
       for (const uint32_t vertex : mesh_.corner_position) mesh_.corner_color.emplace_back(colors[vertex], 1.0f);
     }

@@ -2,10 +2,12 @@
 // Reads numbers and words from text in memory, without copies and without trusting it to end well.
 #pragma once
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <string>
 #include <string_view>
 
 namespace farfield {
@@ -85,6 +87,15 @@ class TextCursor {
 /// UTF-8 text without the mark that some editors on Windows put first.
 inline std::string_view without_byte_order_mark(std::string_view text) {
   return text.starts_with("\xef\xbb\xbf") ? text.substr(3) : text;
+}
+
+/// Text whose lines end as old Macs wrote them, \r alone, with ends that are read here. `storage` keeps what has
+/// changed.
+inline std::string_view with_line_ends(std::string_view text, std::string& storage) {
+  if (text.find('\n') != std::string_view::npos || text.find('\r') == std::string_view::npos) return text;
+  storage = text;
+  std::replace(storage.begin(), storage.end(), '\r', '\n');
+  return storage;
 }
 
 }  // namespace farfield
