@@ -7,7 +7,7 @@
 //   albedo.R, .G, .B     of what the camera sees, premultiplied
 //   N.X, .Y, .Z          its shading normal in world space, premultiplied, 0 in volumes
 //   Z                    depth along the camera's axis of the nearest sample, kNoDepth where there is none
-//   CryptoObject00.R ..  with FilmOptions::ids, see cryptomatte.h
+//   CryptoObject00.R .., CryptoMaterial00.R ..          with FilmOptions::ids, see cryptomatte.h
 #pragma once
 
 #include <array>
@@ -21,8 +21,8 @@ namespace farfield {
 inline constexpr float kNoDepth = 1e10f;
 
 /// What ids there are.
-enum class IdLayer : uint8_t { Object };
-inline constexpr std::array<const char*, 1> kIdLayerNames = {"CryptoObject"};
+enum class IdLayer : uint8_t { Object, Material };
+inline constexpr std::array<const char*, 2> kIdLayerNames = {"CryptoObject", "CryptoMaterial"};
 inline const char* id_layer_name(IdLayer layer) { return kIdLayerNames[static_cast<size_t>(layer)]; }
 
 /// What one path adds to its pixel. All but the colour describe the camera ray's hit and count only with alpha 1.

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <optional>
-#include <set>
 
 #include "base/embree.h"
 #include "base/file_io.h"
@@ -79,12 +78,11 @@ Metadata frame_metadata(const RenderOptions& options, const GltfScene& scene, co
 
 // With ids: whose they are.
 Metadata frame_metadata(const RenderOptions& options, const GltfScene& scene, const Camera& camera, int frame,
-                        std::span<const GltfInstance> instances) {
+                        std::span<const GltfInstance> instances, const MaterialNames& names) {
   Metadata metadata = frame_metadata(options, scene, camera, frame);
   if (!options.cryptomatte) return metadata;
-  std::set<std::string> names;
-  for (const GltfInstance& instance : instances) names.insert(object_name(instance));
-  metadata.merge(cryptomatte_metadata(id_layer_name(IdLayer::Object), names));
+  metadata.merge(cryptomatte_metadata(id_layer_name(IdLayer::Object), names_of_objects(instances)));
+  metadata.merge(cryptomatte_metadata(id_layer_name(IdLayer::Material), names_of_materials(instances, names)));
   return metadata;
 }
 
@@ -131,6 +129,10 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOption
   FARFIELD_TRY_LET(auto folders, find_or_bake_assets(scene, options));
   for (size_t mesh = 0; mesh < folders.size(); ++mesh)
     if (!folders[mesh].empty()) renderer->asset_names_.push_back(scene.meshes[mesh].asset_name);
+  if (options.cryptomatte) {
+    FARFIELD_TRY_LET(auto names, read_material_names(folders));
+    renderer->material_names_ = std::move(names);
+  }
   renderer->fingerprint_ = make_fingerprint(options, folders);
   renderer->scene_ = std::move(scene);
   renderer->lights_ = std::move(lights);
@@ -158,7 +160,8 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     std::vector<GltfInstance> instances = scene_.instances_at(seconds);
     if (!session || !same_places(instances, session_instances)) {
       session.reset();  // before the next one, so that two never share the budget
-      FARFIELD_TRY_LET(auto opened, RenderSession::open(device.get(), options_, asset_folders_, instances));
+      FARFIELD_TRY_LET(auto opened,
+                       RenderSession::open(device.get(), options_, asset_folders_, instances, material_names_));
       session = std::move(opened);
       session_instances = std::move(instances);
     }
@@ -176,7 +179,7 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     report.peak_accounted_bytes = std::max(report.peak_accounted_bytes, session->stats().peak_accounted_bytes);
     report.peak_rss_bytes = memory.peak_bytes();
     report.warnings = warnings_->lines();
-    const Metadata metadata = frame_metadata(options_, scene_, camera, frames[i], session_instances);
+    const Metadata metadata = frame_metadata(options_, scene_, camera, frames[i], session_instances, material_names_);
     if (auto taken = sink(film.image(), metadata, report); !taken) return tl::unexpected(taken.error());
   }
   report.peak_rss_bytes = memory.peak_bytes();

@@ -14,6 +14,7 @@
 #include "path_tracer/image.h"
 #include "path_tracer/integrator.h"
 #include "path_tracer/render_job.h"
+#include "path_tracer/scene_names.h"
 #include "path_tracer/warning_log.h"
 
 namespace farfield {
@@ -46,6 +47,7 @@ class FrameRenderer {
   size_t camera_ = 0;  // index into scene_.cameras
   Lights lights_;
   std::vector<std::filesystem::path> asset_folders_;  // per mesh
+  MaterialNames material_names_;                      // empty without ids
   std::vector<std::string> asset_names_;
   std::string fingerprint_;
 };

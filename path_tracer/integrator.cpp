@@ -12,6 +12,7 @@
 
 #include "base/hash.h"
 #include "base/parallel.h"
+#include "path_tracer/scene_names.h"
 
 namespace farfield {
 
@@ -185,7 +186,9 @@ void PathTracer::describe(const Interaction& seen, const CameraRay& camera_ray, 
   sample.albedo = seen.albedo;
   sample.normal = seen.shading_normal;
   sample.depth = glm::dot(seen.position - camera_ray.origin, view_axis_);
-  if (seen.instance < scene_.object_ids.size()) sample.ids[size_t(IdLayer::Object)] = scene_.object_ids[seen.instance];
+  if (!scene_.ids) return;
+  sample.ids[size_t(IdLayer::Object)] = scene_.ids->object(seen);
+  sample.ids[size_t(IdLayer::Material)] = scene_.ids->material(seen);
 }
 
 FilmSample PathTracer::trace(const CameraRay& camera_ray, uint64_t path_key, float light_choice) {

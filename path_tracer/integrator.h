@@ -33,12 +33,14 @@ struct Lights {
   std::vector<PointLight> points;
 };
 
+class SceneIds;
+
 /// What a path meets. `embree` is committed and holds the runtime's user geometry.
 struct TraceScene {
   EmbreeSceneRef embree = nullptr;
   const Runtime* runtime = nullptr;
   const Lights* lights = nullptr;
-  std::span<const uint32_t> object_ids{};  ///< for Film::has_ids(): cryptomatte_id per InstanceId
+  const SceneIds* ids = nullptr;  ///< for Film::has_ids()
 };
 
 /// How direct light of the environment is found. All three converge to the same image.

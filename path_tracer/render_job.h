@@ -33,7 +33,7 @@ struct RenderOptions {
   std::filesystem::path environment;  ///< EXR or Radiance HDR; empty: sun and sky, see make_lights()
   bool sky = true;                    ///< false: without an environment there is no light but the scene's own
   float exposure_stops = 0;           ///< of the PNG previews
-  bool cryptomatte = false;           ///< also write ids of objects, see film.h
+  bool cryptomatte = false;           ///< also write ids of objects and materials, see film.h
   uint32_t finest_grid = 512;         ///< of assets that have to be baked first
   /// Command that bakes: called as BAKER bake SCENE -o DIR --mesh N ... Empty: this very program.
   std::filesystem::path baker;

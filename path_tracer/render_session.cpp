@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "path_tracer/render_session.h"
 
-#include <fmt/format.h>
-
 #include <chrono>
 
 #include "base/process_memory.h"
 #include "base/result.h"
-#include "path_tracer/cryptomatte.h"
 
 namespace farfield {
 
@@ -29,16 +26,14 @@ RuntimeOptions runtime_options(const RenderOptions& options) {
 
 }  // namespace
 
-std::string object_name(const GltfInstance& instance) {
-  return instance.name.empty() ? fmt::format("node {}", instance.node) : instance.name;
-}
-
 Result<std::unique_ptr<RenderSession>> RenderSession::open(EmbreeDeviceRef device, const RenderOptions& options,
                                                            std::span<const std::filesystem::path> folders,
-                                                           std::span<const GltfInstance> instances) {
+                                                           std::span<const GltfInstance> instances,
+                                                           const MaterialNames& names) {
   std::unique_ptr<RenderSession> session(new RenderSession);
   FARFIELD_TRY_LET(auto runtime, Runtime::create(device, runtime_options(options)));
   session->runtime_ = std::move(runtime);
+  session->ids_ = SceneIds(names);
 
   std::vector<AssetId> assets(folders.size());
   for (size_t mesh = 0; mesh < folders.size(); ++mesh) {
@@ -50,7 +45,7 @@ Result<std::unique_ptr<RenderSession>> RenderSession::open(EmbreeDeviceRef devic
     if (folders[instance.mesh].empty()) continue;
     if (auto added = session->runtime_->add_instance(assets[instance.mesh], instance.to_world); !added)
       return tl::unexpected(added.error());
-    session->object_ids_.push_back(cryptomatte_id(object_name(instance)));
+    if (!names.empty()) session->ids_.add_instance(instance);
   }
   FARFIELD_TRY_LET(auto scene, make_scene(device, *session->runtime_));
   session->scene_ = std::move(scene);
@@ -65,7 +60,7 @@ Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& li
   FARFIELD_TRY_LET(auto plan, runtime_->plan_frame());
   runtime_->prefetch();
 
-  const TraceScene scene{scene_.get(), runtime_.get(), &lights, object_ids_};
+  const TraceScene scene{scene_.get(), runtime_.get(), &lights, &ids_};
   FARFIELD_TRY_LET(const auto traced, path_trace(scene, camera, options.trace, film, job));
 
   const Stats after = runtime_->stats();

@@ -13,20 +13,19 @@
 #include "import/gltf_scene.h"
 #include "path_tracer/film.h"
 #include "path_tracer/render_job.h"
+#include "path_tracer/scene_names.h"
 
 namespace farfield {
-
-/// What an object is called in the picture's ids: as its node, else by the node's number.
-std::string object_name(const GltfInstance& instance);
 
 /// One thread at a time; render() itself uses all threads.
 class RenderSession {
  public:
-  /// folders: per mesh, as find_or_bake_assets gives them; instances of meshes without one are left out. The device
-  /// outlives the session. Errors: those of Runtime.
+  /// folders: per mesh, as find_or_bake_assets gives them; instances of meshes without one are left out.
+  /// names: for ids, of the same folders; empty without. The device outlives the session. Errors: those of Runtime.
   static Result<std::unique_ptr<RenderSession>> open(EmbreeDeviceRef device, const RenderOptions& options,
                                                      std::span<const std::filesystem::path> folders,
-                                                     std::span<const GltfInstance> instances);
+                                                     std::span<const GltfInstance> instances,
+                                                     const MaterialNames& names);
 
   /// Plans for the camera, loads, and renders into the film. The report's frame number is not
   /// set. Errors: those of plan_frame and path_trace.
@@ -38,7 +37,7 @@ class RenderSession {
  private:
   RenderSession() = default;
   std::unique_ptr<Runtime> runtime_;
-  std::vector<uint32_t> object_ids_;  ///< cryptomatte_id per InstanceId
+  SceneIds ids_;
   EmbreeScene scene_;
 };
 

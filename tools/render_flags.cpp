@@ -66,7 +66,7 @@ void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::
                                                  "Light from a latitude-longitude picture, EXR or Radiance HDR");
   command->add_flag("!--no-sky", options.sky, "No sun and sky: the scene's own lights alone")->excludes(environment);
   command->add_flag("--cryptomatte", options.cryptomatte,
-                    "Also write which objects each pixel shows, for mattes by name (Cryptomatte)");
+                    "Also write which objects and materials each pixel shows, for mattes by name (Cryptomatte)");
   command->add_option("--camera", options.camera, "Name or index of a camera of the scene. Without it the first");
   command
       ->add_option("--fps", options.frames_per_second,

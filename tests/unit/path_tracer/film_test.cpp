@@ -64,7 +64,7 @@ TEST(Film, IdsComeWithTheirCoverage) {
   Film film(1, 1, {.ids = true});
   PixelSums sums(film.has_ids());
   FilmSample sample = hit(1), miss;
-  sample.ids[0] = 0x3f800000u;
+  sample.ids = {0x3f800000u, 0x40000000u};
   miss.ids[0] = 5;  // of nothing that was hit
   sums.add(sample), sums.add(miss);
   film.set_pixel(0, 0, sums);
@@ -72,6 +72,8 @@ TEST(Film, IdsComeWithTheirCoverage) {
   EXPECT_EQ(value("CryptoObject00.R"), 1.0f);
   EXPECT_EQ(value("CryptoObject00.G"), 0.5f);
   EXPECT_EQ(value("CryptoObject00.A"), 0.0f);
+  EXPECT_EQ(value("CryptoMaterial00.R"), 2.0f);
+  EXPECT_EQ(value("CryptoMaterial00.G"), 0.5f);
 }
 
 TEST(Film, NoSamplesAreBlackAndFarNotNaN) {

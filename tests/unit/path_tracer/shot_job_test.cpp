@@ -261,7 +261,7 @@ TEST_F(Shot, FramesSayWhatTheCameraSees) {
   const auto file = read_exr(folder_.path() / "frame.exr");
   ASSERT_TRUE(file) << file.error().message;
   const Image& image = file->image;
-  EXPECT_EQ(image.channel_count(), 15u + 2 * kCryptomatteRanks);
+  EXPECT_EQ(image.channel_count(), 15u + 2 * 2 * kCryptomatteRanks);
   const auto at = [&](int x, int y, const char* channel) { return value(image, x, y, channel); };
 
   EXPECT_NEAR(at(24, 16, "Z"), 3.0f, 0.02f);  // along the axis, not the ray
@@ -278,6 +278,8 @@ TEST_F(Shot, FramesSayWhatTheCameraSees) {
   EXPECT_EQ(at(24, 16, "CryptoObject00.G"), 1.0f);
   EXPECT_EQ(at(24, 16, "CryptoObject00.B"), 0.0f);
   EXPECT_EQ(at(47, 0, "CryptoObject00.G"), 0.0f);
+  EXPECT_EQ(at(24, 16, "CryptoMaterial00.R"), id("material 0"));
+  EXPECT_EQ(at(24, 16, "CryptoMaterial00.G"), 1.0f);
   bool sees_second = false;
   for (int x = 0; x < 24; ++x) sees_second |= at(x, 16, "CryptoObject00.R") == id("node 1");
   EXPECT_TRUE(sees_second);
@@ -287,6 +289,16 @@ TEST_F(Shot, FramesSayWhatTheCameraSees) {
 
   const Metadata expected = cryptomatte_metadata("CryptoObject", {"node 0", "node 1"});
   for (const auto& [key, text] : expected) EXPECT_EQ(file->metadata.at(key), text) << key;
+  for (const auto& [key, text] : cryptomatte_metadata("CryptoMaterial", {"(prefiltered)", "material 0"}))
+    EXPECT_EQ(file->metadata.at(key), text) << key;
+
+  options_.full_detail = false;
+  options_.lod_scale = 1e6f;
+  ASSERT_TRUE(render_frame(options_, 0, folder_.path() / "coarse.exr"));
+  const auto coarse = read_exr(folder_.path() / "coarse.exr");
+  ASSERT_TRUE(coarse) << coarse.error().message;
+  EXPECT_EQ(value(coarse->image, 24, 16, "CryptoMaterial00.R"), id("(prefiltered)"));
+  EXPECT_EQ(value(coarse->image, 24, 16, "CryptoObject00.R"), id("node 0"));
 }
 
 TEST_F(Shot, WithoutSkyItIsDark) {
