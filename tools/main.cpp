@@ -4,10 +4,16 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <exception>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "tools/commands.h"
 #include "tools/console.h"
+#include "tools/suggest.h"
 
 namespace {
 
@@ -18,6 +24,43 @@ constexpr int kFailed = 1, kWrongUsage = 2, kInterrupted = 130;
 std::string name_of_command(const CLI::App& app) {
   const auto chosen = app.get_subcommands();
   return chosen.empty() ? "farfield" : "farfield " + chosen.front()->get_name();
+}
+
+std::vector<std::string> names_of_options(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    for (const std::string& name : option->get_snames()) names.push_back("-" + name);
+  }
+  return names;
+}
+
+std::vector<std::string> names_of_commands(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+  return names;
+}
+
+bool looks_like_option(const std::string& word) { return word.size() > 1 && word[0] == '-'; }
+
+std::string unknown(std::string_view word, std::string_view what, std::span<const std::string> known) {
+  const auto meant = tool::nearest_name(word, known);
+  return fmt::format("{}: unknown {}{}", word, what, meant ? fmt::format("; did you mean {}?", *meant) : "");
+}
+
+// What is wrong with the command line. An unknown word comes before what the parser says: it is the reason that a value
+// stands in the wrong place, or that something is missing.
+std::string what_is_wrong(const CLI::App& app, const CLI::ParseError& error) {
+  const auto chosen = app.get_subcommands();
+  const CLI::App& command = chosen.empty() ? app : *chosen.front();
+  std::vector<std::string> not_understood = app.remaining(true);
+  not_understood.erase(std::ranges::find(not_understood, "--"), not_understood.end());  // no options behind it
+  const auto option = std::ranges::find_if(not_understood, looks_like_option);
+  if (chosen.empty() && !not_understood.empty() && option != not_understood.begin())
+    return unknown(not_understood.front(), "command", names_of_commands(app));
+  if (option != not_understood.end())
+    return unknown(option->substr(0, option->find('=')), "option", names_of_options(command));
+  return error.what();
 }
 
 int run(int argc, char** argv) {
@@ -39,7 +82,7 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
     const std::string name = name_of_command(app);
-    fmt::print(stderr, "{}: {} (see {} --help)\n", name, tool::one_line(error.what()), name);
+    fmt::print(stderr, "{}: {} (see {} --help)\n", name, tool::one_line(what_is_wrong(app, error)), name);
     return kWrongUsage;
   }
 

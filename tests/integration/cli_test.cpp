@@ -142,6 +142,23 @@ TEST(Usage, NonsenseIsOneLineThatPointsToTheHelp) {
 }
 
 /// Files that are not what they should be.
+TEST(Usage, UnknownWordsAreNamedWithTheNearestKnownOne) {
+  const auto says = [](const std::vector<std::string>& arguments, const std::string& line) {
+    const ProcessOutput output = farfield(arguments);
+    EXPECT_EQ(output.exit_code, 2);
+    expect_one_line_error(output, line);
+  };
+  says({"bkae"}, "farfield: bkae: unknown command; did you mean bake? (see farfield --help)");
+  says({"bkae", "a.obj", "-o", "b"}, "bkae: unknown command; did you mean bake?");
+  says({"frobnicate"}, "farfield: frobnicate: unknown command (see");
+  says({"--verson"}, "farfield: --verson: unknown option; did you mean --version?");
+  says({"render", "--bugdet", "300M", "scene.glb", "-o", "a.exr"},
+       "farfield render: --bugdet: unknown option; did you mean --budget? (see farfield render --help)");
+  says({"render", "scene.glb", "--bugdet=300M"}, "--bugdet: unknown option; did you mean --budget?");
+  says({"bake", "--", "-a.obj"}, "--output is required");
+  says({"bake", "a.obj", "-o", "b", "--frobnicate"}, "farfield bake: --frobnicate: unknown option (see");
+}
+
 class BadInput : public testing::Test {
  protected:
   const fs::path folder = fresh_folder("bad_input");
