@@ -25,6 +25,10 @@ if(NOT warnings EQUAL 0) # a texture that cannot be read is a warning, and its m
   message(FATAL_ERROR "the bake warned:\n${report}")
 endif()
 
+if(NOT EXISTS ${work}/prefix/share/bash-completion/completions/farfield)
+  message(FATAL_ERROR "bash's completion is not installed")
+endif()
+
 # Without it every command that reads no image works, and a textured bake fails rather than bake plain colours.
 file(REMOVE ${work}/prefix/${libdir}/farfield/farfield_textures.so)
 run("farfield " ${tool} --version)
