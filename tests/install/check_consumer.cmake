@@ -20,9 +20,24 @@ if(with_bake)
   run(${work}/samples/bake_from_memory ${work}/bush.farfield ${work}/bush.ppm)
 endif()
 
-if(NOT EXISTS ${work}/prefix/${docdir}/LICENSE)
-  message(FATAL_ERROR "the licence is not installed")
+# A host that builds without CMake, from a prefix that was moved.
+file(RENAME ${work}/prefix ${work}/moved)
+set(ENV{PKG_CONFIG_PATH} ${work}/moved/${libdir}/pkgconfig)
+execute_process(COMMAND pkg-config --cflags --libs farfield RESULT_VARIABLE result OUTPUT_VARIABLE flags ERROR_VARIABLE flags)
+if(NOT result EQUAL 0)
+  message(FATAL_ERROR "pkg-config does not find farfield:\n${flags}")
 endif()
+separate_arguments(flags UNIX_COMMAND "${flags}")
+run(${compiler} -std=c++17 -Werror ${work}/moved/${docdir}/samples/minimal_host/main.cpp -o ${work}/by_pkg_config ${flags}
+    -Wl,-rpath,${work}/moved/${libdir})
+run(${work}/by_pkg_config ${asset} ${work}/by_pkg_config.ppm)
+file(RENAME ${work}/moved ${work}/prefix)
+
+foreach(file LICENSE licenses.md)
+  if(NOT EXISTS ${work}/prefix/${docdir}/${file})
+    message(FATAL_ERROR "not installed: ${docdir}/${file}")
+  endif()
+endforeach()
 # Nothing but the public headers is installed, and they include nothing that is not.
 file(GLOB_RECURSE headers RELATIVE ${work}/prefix/include ${work}/prefix/include/*)
 foreach(header ${headers})

@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: Apache-2.0
+cmake_minimum_required(VERSION 3.25) # for IN_LIST
+# docs/licenses.md names every package of scripts/packages.txt that is not optional, and none besides.
+file(STRINGS ${source}/scripts/packages.txt lines)
+file(READ ${source}/docs/licenses.md text)
+string(REGEX MATCHALL "`[^` ]+`" named "${text}")
+
+foreach(line ${lines})
+  if(line MATCHES "^# optional")
+    break()
+  endif()
+  string(REGEX REPLACE "[ ]*#.*" "" package "${line}")
+  if(package STREQUAL "")
+    continue()
+  endif()
+  list(APPEND packages "`${package}`")
+  if(NOT "`${package}`" IN_LIST named)
+    message(SEND_ERROR "docs/licenses.md lacks ${package} of scripts/packages.txt")
+  endif()
+endforeach()
+foreach(name ${named})
+  if(name MATCHES "-dev`$" AND NOT name IN_LIST packages)
+    message(SEND_ERROR "docs/licenses.md names ${name}, which scripts/packages.txt does not")
+  endif()
+endforeach()
