@@ -233,7 +233,8 @@ class Baker {
     report_.manifest.textures = look_.textures;
     report_.manifest.materials = look_.materials;
 
-    const Surface faces = average_faces(source_);
+    const Surface faces = average_faces(source_, options_.job);
+    if (options_.job.is_cancelled()) return cancelled();
     source_order_ = order_surface(faces);
     const Surface ordered = reorder(faces, source_order_);
     LevelData level = pack_level(0, report_.manifest.base_resolution, ordered, source_order_, {}, {});
@@ -251,6 +252,7 @@ class Baker {
     level_report.grid = options_.finest_grid >> (level - 1);
     if (!is_resolved_) {
       if (level != last_level_ && saves_nothing_resolved(level, resolution)) {
+        if (options_.job.is_cancelled()) return cancelled();
         level_report.worthless = true;
         report_.levels.push_back(level_report);
         return {};
@@ -277,7 +279,7 @@ class Baker {
   /// Whether a level that shows the source's detail at this resolution would take more than level 0.
   bool saves_nothing_resolved(uint32_t level, double resolution) const {
     constexpr uint64_t kLeastPerFace = 40;  // a BVH of quads, colours and normals
-    const uint64_t faces = estimate_resolved_faces(source_, static_cast<float>(resolution));
+    const uint64_t faces = estimate_resolved_faces(source_, static_cast<float>(resolution), options_.job);
     const bool is_split = faces > source_.triangles.size();  // else simplification decides what it takes
     return is_split && kLeastPerFace * faces > most_bytes_worth_writing(level);
   }
@@ -487,8 +489,8 @@ Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, con
   report.manifest = make_manifest(source_name, asset.source_hash, options);
   report.manifest.source_files = std::move(asset.source_files);
   report.manifest.warnings = std::move(asset.warnings);
-  if (auto manifest = read_manifest(out);
-      manifest && are_same_bake(*manifest, report.manifest) && is_whole(out, *manifest)) {
+  if (auto manifest = read_manifest(out); !options.even_if_up_to_date && manifest &&
+                                          are_same_bake(*manifest, report.manifest) && is_whole(out, *manifest)) {
     report.manifest = std::move(*manifest);
     report.up_to_date = true;
     report.total_seconds = watch.seconds();

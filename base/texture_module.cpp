@@ -14,6 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFileName = "farfield_textures.so";
+constexpr int kDeepestBelowPrefix = 4;  // lib/python3/dist-packages/farfield
 constexpr const char* kFolderVariable = "FARFIELD_MODULE_DIR";
 
 /// The folder of the program or the shared library that this code was linked into; empty if the system does not say.
@@ -40,8 +41,14 @@ std::vector<fs::path> texture_module_folders() {
   if (const char* folder = std::getenv(kFolderVariable); folder && *folder) return {folder};
   const fs::path here = folder_of_this_code();
   if (here.empty()) return {};
-  // From the folder of programs, and from that of libraries.
-  return {(here / ".." / FARFIELD_LIBRARY_FOLDER / "farfield").lexically_normal(), here / "farfield"};
+  // From the folder of libraries; then from those of programs and of Python modules, which lie deeper.
+  std::vector<fs::path> folders = {here / "farfield"};
+  fs::path prefix = here;
+  for (int up = 0; up < kDeepestBelowPrefix; ++up) {
+    prefix = prefix.parent_path();
+    folders.push_back(prefix / FARFIELD_LIBRARY_FOLDER / "farfield");
+  }
+  return folders;
 }
 
 Result<const TextureModule*> load_texture_module(std::span<const fs::path> folders) {

@@ -275,11 +275,14 @@ Result<Evaluation> evaluate(const EvaluateOptions& options) {
     return make_error(ErrorCode::InvalidArgument, "evaluate needs at least one view and one sample per pixel");
   FARFIELD_TRY_LET(auto manifest, read_manifest(options.asset));
   FARFIELD_TRY_LET(auto folder, TemporaryFolder::create());
-  FARFIELD_TRY_LET(auto source_manifest, bake_source(options, folder.path()));
+  const bool has_source = !options.source.empty();
+  const fs::path& source_folder = has_source ? folder.path() : options.asset;
+  FARFIELD_TRY_LET(auto source_manifest,
+                   has_source ? bake_source(options, source_folder) : read_manifest(options.asset));
 
   FARFIELD_TRY_LET(auto plans,
                    plan_evaluation(manifest, in_source_space(source_manifest.bounds, source_manifest), options));
-  FARFIELD_TRY_LET(auto source, AssetView::open(folder.path(), 0.0f));
+  FARFIELD_TRY_LET(auto source, AssetView::open(source_folder, 0.0f));
 
   FARFIELD_TRY_LET(auto evaluation, Evaluator(options, *source).run(plans));
   if (source_manifest.source_hash != manifest.source_hash) {

@@ -17,7 +17,7 @@ namespace farfield {
 
 struct EvaluateOptions {
   std::filesystem::path asset;   ///< baked folder
-  std::filesystem::path source;  ///< the file it was baked from; imported anew
+  std::filesystem::path source;  ///< the file it was baked from; imported anew. Empty: the asset's own level 0
   ImportOptions import;          ///< as given to the bake
   uint32_t first_level = 1;      ///< stored levels in [first_level, last_level] are evaluated
   uint32_t last_level = 0xffffffffu;

@@ -117,11 +117,24 @@ dmat4 world_matrix(const GltfScene& scene, uint32_t node, double seconds) {
 
 dmat4 to_square(const mat4x3& m) { return dmat4(dvec4(m[0], 0), dvec4(m[1], 0), dvec4(m[2], 0), dvec4(m[3], 1)); }
 
+/// In floats, seen from `origin`.
 mat4x3 to_affine(const dmat4& m, const dvec3& origin = dvec3(0.0)) {
   return mat4x3(vec3(m[0]), vec3(m[1]), vec3(m[2]), vec3(dvec3(m[3]) - origin));
 }
 
-/// Puts a camera where its node is. Scales, mirrors and shears are taken out: forward stays, up is made upright to it.
+vec3 corner_of(const Box3& box, int number) {
+  return vec3((number & 1 ? box.upper : box.lower).x, (number & 2 ? box.upper : box.lower).y,
+              (number & 4 ? box.upper : box.lower).z);
+}
+
+/// Whether floats are so sparse where the box lies that the steps between them could be seen on what is in it.
+bool is_far_for_its_size(const dvec3& lower, const dvec3& upper) {
+  constexpr double kFarthestInSizes = 16;  // a 2^19th of its size is then the step of a float
+  return glm::length(0.5 * (lower + upper)) > kFarthestInSizes * glm::length(upper - lower);  // false for NaN
+}
+
+/// Puts a camera where its node is, seen from `origin`. Scales, mirrors and shears are taken out: forward stays, up is
+/// made upright to it.
 void place(GltfCamera& camera, const dmat4& world, const dvec3& origin) {
   camera.position = vec3(dvec3(world[3]) - origin);
   const dvec3 forward = -dvec3(world[2]), up(world[1]);
@@ -139,9 +152,7 @@ class SceneReader {
 
   Result<GltfScene> read() {
     scene_.warnings = document_.warnings;
-    for (size_t m = 0; m < model_.meshes.size(); ++m) {
-      FARFIELD_TRY(read_mesh(m));
-    }
+    for (size_t m = 0; m < model_.meshes.size(); ++m) scene_.meshes.push_back(read_mesh_or_nothing(m));
     const std::vector<int> order = scene_nodes(document_);
     flatten_nodes(order);
     for (const auto& animation : model_.animations) {
@@ -155,11 +166,21 @@ class SceneReader {
  private:
   void warn(std::string text) { scene_.warnings.push_back(std::move(text)); }
 
-  Result<void> read_mesh(size_t index) {
-    const auto& source = model_.meshes[index];
+  /// One broken mesh does not stop a scene: it stays empty, and is warned about.
+  GltfMesh read_mesh_or_nothing(size_t index) {
     GltfMesh mesh;
-    mesh.name = source.name;
-    mesh.asset_name = unique_name(source.name, index);
+    mesh.name = model_.meshes[index].name;
+    mesh.asset_name = unique_name(mesh.name, index);
+    if (const auto measured = measure(model_.meshes[index], mesh); !measured) {
+      warn(fmt::format("mesh {} ({}) is left out: {}", index, mesh.name, measured.error().message));
+      mesh.bounds = Box3();
+      mesh.triangle_count = 0;
+    }
+    return mesh;
+  }
+
+  /// Counts the triangles and finds the bounds.
+  Result<void> measure(const tinygltf::Mesh& source, GltfMesh& mesh) {
     for (const auto& primitive : source.primitives) {
       const auto position = primitive.attributes.find("POSITION");
       if (position == primitive.attributes.end()) continue;
@@ -171,7 +192,9 @@ class SceneReader {
       FARFIELD_TRY_LET(auto box, position_bounds(position->second));
       mesh.bounds.extend(box);
     }
-    scene_.meshes.push_back(std::move(mesh));
+    if (is_far_for_its_size(dvec3(mesh.bounds.lower), dvec3(mesh.bounds.upper)))
+      warn(fmt::format("mesh {}: its points lie so far from its origin that they are coarse; move its node instead",
+                       mesh.asset_name));
     return {};
   }
 
@@ -327,36 +350,20 @@ class SceneReader {
   Result<void> place_everything(const std::vector<int>& order) {
     const std::vector<dmat4> world = world_matrices(scene_, 0);
     const std::vector<bool> hidden = hidden_nodes(document_);
-    scene_.origin_world = find_origin(order, world);
     for (uint32_t i = 0; i < order.size(); ++i) {
       const auto& node = model_.nodes[static_cast<size_t>(order[i])];
-      const bool is_hidden = hidden[static_cast<size_t>(order[i])];
-      if (node.mesh >= 0 && !is_hidden) FARFIELD_TRY(add_instances(node, order[i], i, world));
+      if (node.mesh >= 0 && !hidden[static_cast<size_t>(order[i])])
+        FARFIELD_TRY(add_instances(node, order[i], i, world));
+    }
+    place_instances();
+    for (uint32_t i = 0; i < order.size(); ++i) {
+      const auto& node = model_.nodes[static_cast<size_t>(order[i])];
       if (node.camera >= 0) add_camera(node, i, world[i]);
       const auto light = node.extensions.find("KHR_lights_punctual");
-      if (light != node.extensions.end() && !is_hidden) add_light(node, light->second, i, world[i]);
+      if (light != node.extensions.end() && !hidden[static_cast<size_t>(order[i])])
+        add_light(node, light->second, i, world[i]);
     }
     return {};
-  }
-
-  /// The middle of all mesh nodes if it lies so far out that floats there are coarser than a millionth of their extent.
-  dvec3 find_origin(const std::vector<int>& order, const std::vector<dmat4>& world) const {
-    dvec3 lower(INFINITY), upper(-INFINITY);
-    for (size_t i = 0; i < order.size(); ++i) {
-      const auto& node = model_.nodes[static_cast<size_t>(order[i])];
-      const int mesh = node.skin < 0 ? node.mesh : -1;  // skinned meshes stand elsewhere
-      if (mesh < 0 || scene_.meshes[static_cast<size_t>(mesh)].bounds.is_empty()) continue;
-      const Box3& box = scene_.meshes[static_cast<size_t>(mesh)].bounds;
-      for (const vec3& corner : {box.lower, box.upper}) {
-        const dvec3 p(world[i] * dvec4(dvec3(corner), 1));
-        lower = glm::min(lower, p);
-        upper = glm::max(upper, p);
-      }
-    }
-    constexpr double kFar = 16;  // 2^-24 of it is a millionth
-    const dvec3 middle = 0.5 * (lower + upper);
-    const bool is_far = std::isfinite(glm::length(middle)) && glm::length(middle) > kFar * glm::length(upper - lower);
-    return is_far ? middle : dvec3(0.0);
   }
 
   Result<void> add_instances(const tinygltf::Node& node, int number, uint32_t index, const std::vector<dmat4>& worlds) {
@@ -377,8 +384,8 @@ class SceneReader {
       const mat4x3 in_node = to_affine(transform);
       const auto seen = first_seen(to_square(in_node));
       if (seen) {
-        scene_.instances.push_back(
-            {static_cast<uint32_t>(node.mesh), to_affine(*seen, scene_.origin_world), node.name, index, in_node});
+        scene_.instances.push_back({static_cast<uint32_t>(node.mesh), mat4x3(1), node.name, index, in_node});
+        places_.push_back(*seen);
       } else {
         ++singular;
       }
@@ -404,6 +411,24 @@ class SceneReader {
       if (!scene_.nodes[static_cast<size_t>(n)].channels.empty()) return true;
     }
     return false;
+  }
+
+  /// Chooses the origin, the middle of all instances or zero, and puts them where they are from there.
+  void place_instances() {
+    dvec3 lower(INFINITY), upper(-INFINITY);
+    for (size_t i = 0; i < places_.size(); ++i) {
+      const Box3& bounds = scene_.meshes[scene_.instances[i].mesh].bounds;
+      if (bounds.is_empty()) continue;
+      for (int corner = 0; corner < 8; ++corner) {
+        const dvec3 point(places_[i] * dvec4(corner_of(bounds, corner), 1));
+        lower = glm::min(lower, point);
+        upper = glm::max(upper, point);
+      }
+    }
+    const vec3 middle(0.5 * (lower + upper));  // a float, so that those who have floats can add it without loss
+    if (is_far_for_its_size(lower, upper) && is_finite(middle)) scene_.origin_world = dvec3(middle);
+    for (size_t i = 0; i < places_.size(); ++i)
+      scene_.instances[i].to_world = to_affine(places_[i], scene_.origin_world);
   }
 
   /// The keys of a node and its ancestors, and the times halfway between them, in order.
@@ -482,6 +507,7 @@ class SceneReader {
   const tinygltf::Model& model_;
   GltfScene scene_;
   std::vector<int32_t> scene_index_;  ///< of each node of the file, or -1 when it is not in the scene
+  std::vector<dmat4> places_;         ///< of the instances, in the file's coordinates
   std::set<std::string> taken_names_;
 };
 

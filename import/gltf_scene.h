@@ -77,7 +77,7 @@ struct GltfNode {
   std::vector<uint32_t> channels;  ///< indices into GltfScene::channels
 };
 
-/// Immutable once read; thread-safe. "World" is the file's, less `origin`.
+/// Immutable once read; thread-safe. "World" is the file's, less `origin_world`.
 struct GltfScene {
   /// Subtracted from all that stands in the world, in double precision: map coordinates leave a float no digits. The
   /// middle of the scene if that lies far from 0 for its size, else 0.

@@ -63,6 +63,15 @@ uint64_t combine(uint64_t main_file, const std::vector<HashedFile>& files, const
 
 }  // namespace
 
+Result<uint64_t> FileHashes::of(const fs::path& path) {
+  const auto known = known_.find(path);
+  if (known != known_.end()) return known->second;
+  const auto bytes = read_file(path);
+  const Result<uint64_t> hash =
+      bytes ? Result<uint64_t>(hash_values<unsigned char>(*bytes)) : tl::unexpected(bytes.error());
+  return known_.emplace(path, hash).first->second;
+}
+
 Result<SourceMesh> read_source(const fs::path& path, const ImportOptions& options) {
   FARFIELD_TRY_LET(const auto bytes, read_file(path));
   FARFIELD_TRY_LET(auto mesh, read_as_named(bytes, path, options));
@@ -71,13 +80,12 @@ Result<SourceMesh> read_source(const fs::path& path, const ImportOptions& option
 }
 
 Result<uint64_t> hash_source(const fs::path& path, const std::vector<HashedFile>& files, const ImportOptions& options) {
-  FARFIELD_TRY_LET(const auto main_file, read_file(path));
+  FileHashes own;
+  FileHashes& hashes = options.known_hashes ? *options.known_hashes : own;
+  FARFIELD_TRY_LET(const auto main_file, hashes.of(path));
   std::vector<HashedFile> now = files;
-  for (HashedFile& file : now) {
-    const auto bytes = read_file(path.parent_path() / file.path);
-    file.hash = bytes ? hash_values<unsigned char>(*bytes) : 0;
-  }
-  return combine(hash_values<unsigned char>(main_file), now, options);
+  for (HashedFile& file : now) file.hash = hashes.of(path.parent_path() / file.path).value_or(0);
+  return combine(main_file, now, options);
 }
 
 }  // namespace farfield

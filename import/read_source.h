@@ -3,14 +3,27 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 
 #include "import/source_mesh.h"
 
 namespace farfield {
 
+/// The hashes of files that were read already, so that asking about each of many meshes reads their file once. Files
+/// are taken not to change meanwhile. One thread at a time.
+class FileHashes {
+ public:
+  /// Of the file's unpacked bytes. Errors: those of read_file().
+  Result<uint64_t> of(const std::filesystem::path& path);
+
+ private:
+  std::map<std::filesystem::path, Result<uint64_t>> known_;
+};
+
 struct ImportOptions {
   int mesh =
       -1;  ///< glTF only: import this mesh alone, in its own space; -1: all nodes of the default scene, flattened
+  FileHashes* known_hashes = nullptr;  ///< hash_source() looks there first; null: it reads
 };
 
 /// Reads the file and those that it refers to. Content decides what a file is where it says so, its name otherwise.

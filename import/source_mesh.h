@@ -35,7 +35,6 @@ struct SourceMesh {
   std::vector<vec2> corner_uv;            ///< empty, or one per corner; v points down the image
   std::vector<vec4> corner_color;         ///< empty, or one per corner; linear RGBA
   std::vector<vec3> corner_normal;        ///< empty, or one per corner: shading normal, any length; 0: the face's own
-  std::vector<vec4> corner_tangent;       ///< empty, or one per corner: along u, any length (0: from uv); w: handedness
   std::vector<uint32_t> face_material;    ///< index into materials
   std::vector<SourceMaterial> materials;
   MaterialFunction material_function;    ///< a host's own; if set, `materials` give names and modes only

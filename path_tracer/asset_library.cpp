@@ -8,7 +8,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cstring>
 #include <optional>
@@ -28,6 +27,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::chrono::milliseconds kPollInterval{10};
+constexpr int kBakeFailed = 1;  // exit code of `farfield bake` that says why on standard error
 
 // "forest" for forest.glb, forest.gltf, forest.glb.gz.
 std::string scene_name(const fs::path& scene) {
@@ -91,41 +91,54 @@ std::vector<std::string> bake_command(const RenderOptions& options, size_t mesh,
                                       fmt::format("{}", options.finest_grid),
                                       "--threads",
                                       fmt::format("{}", thread_count()),
-                                      "--quiet"};
+                                      "--no-warnings"};  // said here, from the manifest
   if (options.full_detail) command.push_back("--source-only");
   return command;
 }
 
-BakeOptions bake_options(const RenderOptions& options, size_t mesh) {
+BakeOptions bake_options(const RenderOptions& options, size_t mesh, FileHashes& hashes) {
   BakeOptions bake;
   bake.finest_grid = options.finest_grid;
   bake.source_only = options.full_detail;
   bake.import.mesh = static_cast<int>(mesh);
+  bake.import.known_hashes = &hashes;
   return bake;
 }
 
-// What the bake said, which is as true of this picture as of the asset.
-void repeat_warnings(const GltfScene& scene, const RenderOptions& options, size_t mesh, const Manifest& manifest) {
-  if (!options.warning) return;
-  for (const std::string& warning : manifest.warnings)
-    options.warning(fmt::format("mesh {}: {}", scene.meshes[mesh].asset_name, warning));
+void warn(const RenderOptions& options, const std::string& line) {
+  if (options.warning) options.warning(line);
 }
 
-// How a bake ended.
-struct BakeEnd {
-  bool is_done = false;
-  std::string how;  // if not: "exit code 3"
-};
+// What a bake warned of is as true of the picture, now and at each later run.
+void repeat_warnings(const RenderOptions& options, const GltfMesh& mesh, const Manifest& manifest) {
+  for (const std::string& warning : manifest.warnings)
+    warn(options, fmt::format("mesh {}: {}", mesh.asset_name, warning));
+}
 
-Result<BakeEnd> bake_mesh(const RenderOptions& options, size_t mesh, const fs::path& folder) {
+// Errors: Unsupported, when it is the mesh that cannot be baked and others may; else Io, BadFile, Cancelled.
+Result<void> bake_mesh(const GltfScene& scene, const RenderOptions& options, size_t mesh, const fs::path& folder) {
   FARFIELD_TRY_LET(const auto child, start(bake_command(options, mesh, folder)));
   FARFIELD_TRY_LET(const auto status, wait_for(child, options));
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return BakeEnd{true, {}};
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
   if (options.job.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
-  if (WIFEXITED(status)) return BakeEnd{false, fmt::format("exit code {}", WEXITSTATUS(status))};
-  // Killed from outside or out of memory: no fault of the mesh.
-  return make_error(ErrorCode::BadFile, fmt::format("{}: baking mesh {} failed (signal {})", options.scene.string(),
-                                                    mesh, WTERMSIG(status)));
+  const std::string how = WIFSIGNALED(status) ? fmt::format("signal {}", WTERMSIG(status))
+                                              : fmt::format("exit code {}", WEXITSTATUS(status));
+  const bool has_refused = WIFEXITED(status) && WEXITSTATUS(status) == kBakeFailed;
+  return make_error(
+      has_refused ? ErrorCode::Unsupported : ErrorCode::BadFile,
+      fmt::format("{}: baking mesh {} \"{}\" failed ({})", options.scene.string(), mesh, scene.meshes[mesh].name, how));
+}
+
+// The mesh's asset is in `folder` afterwards, up to date, and its warnings have been said.
+Result<void> find_or_bake(const GltfScene& scene, const RenderOptions& options, size_t mesh, const fs::path& folder,
+                          FileHashes& hashes) {
+  if (const auto found = find_up_to_date(options.scene, folder, bake_options(options, mesh, hashes))) {
+    repeat_warnings(options, scene.meshes[mesh], *found);
+    return {};
+  }
+  FARFIELD_TRY(bake_mesh(scene, options, mesh, folder));
+  if (const auto baked = read_manifest(folder)) repeat_warnings(options, scene.meshes[mesh], *baked);
+  return {};
 }
 
 std::vector<bool> meshes_in_use(const GltfScene& scene) {
@@ -153,30 +166,24 @@ Result<std::vector<fs::path>> find_or_bake_assets(const GltfScene& scene, const 
 
   const std::vector<bool> in_use = meshes_in_use(scene);
   std::vector<fs::path> folders(scene.meshes.size());
-  std::string broken;  // the first
+  FileHashes hashes;  // the scene is read once, however many meshes it has
+  std::optional<Error> first_failure;
+  bool any = false;
   for (size_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {
     if (!in_use[mesh]) continue;
     const char* suffix = options.full_detail ? ".source.farfield" : ".farfield";
     const fs::path folder = library / (scene.meshes[mesh].asset_name + suffix);
-    if (const auto manifest = find_up_to_date(options.scene, folder, bake_options(options, mesh))) {
-      repeat_warnings(scene, options, mesh, *manifest);
+    const auto found = find_or_bake(scene, options, mesh, folder, hashes);
+    if (found) {
       folders[mesh] = folder;
+      any = true;
       continue;
     }
-    FARFIELD_TRY_LET(const auto end, bake_mesh(options, mesh, folder));
-    if (end.is_done) {
-      if (const auto manifest = read_manifest(folder)) repeat_warnings(scene, options, mesh, *manifest);
-      folders[mesh] = folder;
-      continue;
-    }
-    const std::string said = fmt::format("baking mesh {} \"{}\" failed ({})", mesh, scene.meshes[mesh].name, end.how);
-    if (broken.empty()) broken = said;
-    if (options.warning) options.warning(said + "; it is left out");
+    if (found.error().code != ErrorCode::Unsupported) return tl::unexpected(found.error());
+    if (!first_failure) first_failure = found.error();
+    warn(options, fmt::format("{}; the picture is without it", found.error().message));
   }
-  if (!broken.empty() && std::ranges::all_of(folders, &fs::path::empty)) {
-    return make_error(ErrorCode::BadFile,
-                      fmt::format("{}: {}, and nothing is left to show", options.scene.string(), broken));
-  }
+  if (first_failure && !any) return tl::unexpected(*first_failure);
   return folders;
 }
 

@@ -20,11 +20,11 @@ namespace farfield {
 std::filesystem::path asset_library_folder(const RenderOptions& options);
 
 /// For each mesh of the scene the folder of its baked asset, up to date with the scene and the options; empty for
-/// meshes that no instance shows, that have no triangles, or whose bake fails (with a warning: one broken mesh stops no
-/// scene). Bakes what is missing or stale, one mesh after the other,
-/// each in a process of its own (`farfield bake SCENE -o DIR --mesh N`), so that this one's memory stays what rendering
-/// needs. Errors: Io (the bake cannot be started), BadFile (it was killed, or none is left; it has said why on standard
-/// error), Cancelled.
+/// meshes that no instance shows, that have no triangles, or that cannot be baked while others can: each of those is a
+/// warning, and the scene is shown without it. Warnings of the bakes are said, too. Bakes what is missing or stale, one
+/// mesh after the other, each in a process of its own (`farfield bake SCENE -o DIR --mesh N`), so that this one's
+/// memory stays what rendering needs. Errors: Io (the bake cannot be started), BadFile (it was killed), Unsupported (no
+/// mesh could be baked; the bakes have said why on standard error), Cancelled.
 Result<std::vector<std::filesystem::path>> find_or_bake_assets(const GltfScene& scene, const RenderOptions& options);
 
 }  // namespace farfield

@@ -12,11 +12,11 @@
 #include "base/file_io.h"
 #include "base/hash.h"
 #include "base/parallel.h"
+#include "base/process_memory.h"
 #include "base/result.h"
 #include "cache/manifest.h"
 #include "path_tracer/asset_library.h"
 #include "path_tracer/film.h"
-#include "path_tracer/process_memory.h"
 #include "path_tracer/render_session.h"
 #include "path_tracer/scene_setup.h"
 #include "path_tracer/warm_up.h"
@@ -59,14 +59,13 @@ std::string make_fingerprint(const RenderOptions& options, std::span<const fs::p
   return text;
 }
 
-// origin: GltfScene::origin_world; positions in files are those of the scene's file.
-Metadata frame_metadata(const RenderOptions& options, const Camera& camera, const dvec3& origin, int frame) {
+Metadata frame_metadata(const RenderOptions& options, const GltfScene& scene, const Camera& camera, int frame) {
   const TessellationCamera pixel = camera.tessellation();
   return {
       {"camera.forward", camera.forward()},
       {"camera.pixel_spread", pixel.pixel_spread},
       {"camera.pixel_width", pixel.pixel_width},
-      {"camera.position", vec3(dvec3(camera.position()) + origin)},
+      {"camera.position", vec3(dvec3(camera.position()) + scene.origin_world)},
       {"camera.up", camera.up()},
       {"farfield.budget", fmt::format("{}", options.budget_bytes)},
       {"farfield.frame", frame},
@@ -79,9 +78,9 @@ Metadata frame_metadata(const RenderOptions& options, const Camera& camera, cons
 }
 
 // With ids: whose they are.
-Metadata frame_metadata(const RenderOptions& options, const Camera& camera, const dvec3& origin, int frame,
+Metadata frame_metadata(const RenderOptions& options, const GltfScene& scene, const Camera& camera, int frame,
                         std::span<const GltfInstance> instances) {
-  Metadata metadata = frame_metadata(options, camera, origin, frame);
+  Metadata metadata = frame_metadata(options, scene, camera, frame);
   if (!options.cryptomatte) return metadata;
   std::set<std::string> names;
   for (const GltfInstance& instance : instances) names.insert(object_name(instance));
@@ -110,27 +109,26 @@ bool any_has_textures(const std::vector<std::filesystem::path>& folders) {
 
 }  // namespace
 
-Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOptions& options) {
-  if (options.width < 1 || options.height < 1 || options.width > kLargestSide || options.height > kLargestSide)
-    return make_error(ErrorCode::InvalidArgument, fmt::format("images of {} x {} pixels: 1 to {} each way",
-                                                              options.width, options.height, kLargestSide));
+Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOptions& given) {
+  if (given.width < 1 || given.height < 1 || given.width > kLargestSide || given.height > kLargestSide)
+    return make_error(ErrorCode::InvalidArgument, fmt::format("images of {} x {} pixels: 1 to {} each way", given.width,
+                                                              given.height, kLargestSide));
   std::unique_ptr<FrameRenderer> renderer(new FrameRenderer);
-  renderer->options_ = options;
-  renderer->options_.warning = [&said = renderer->warnings_, print = options.warning](const std::string& line) {
-    if (said.add(line) && print) print(line);
-  };
-  const auto& warn = renderer->options_.warning;
+  renderer->warnings_ = std::make_shared<WarningLog>(given.warning);
+  renderer->options_ = given;
+  renderer->options_.warning = [log = renderer->warnings_](const std::string& line) { log->add(line); };
+  const RenderOptions& options = renderer->options_;
 
   FARFIELD_TRY_LET(auto scene, read_gltf_scene(options.scene));
+  for (const std::string& warning : scene.warnings) options.warning(warning);  // before an error may come
   FARFIELD_TRY_LET(const auto camera, find_camera(scene, options.camera));
   renderer->camera_ = camera;
   if (options.frames_per_second > 0) scene.frames_per_second = options.frames_per_second;
-  for (const std::string& warning : scene.warnings) warn(warning);  // before an error may come
   std::vector<std::string> of_lights;
   FARFIELD_TRY_LET(auto lights, make_lights(scene, options, of_lights));
-  for (const std::string& warning : of_lights) warn(warning);
+  for (const std::string& warning : of_lights) options.warning(warning);
 
-  FARFIELD_TRY_LET(auto folders, find_or_bake_assets(scene, renderer->options_));
+  FARFIELD_TRY_LET(auto folders, find_or_bake_assets(scene, options));
   for (size_t mesh = 0; mesh < folders.size(); ++mesh)
     if (!folders[mesh].empty()) renderer->asset_names_.push_back(scene.meshes[mesh].asset_name);
   renderer->fingerprint_ = make_fingerprint(options, folders);
@@ -177,12 +175,11 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     report.frames.push_back(std::move(frame));
     report.peak_accounted_bytes = std::max(report.peak_accounted_bytes, session->stats().peak_accounted_bytes);
     report.peak_rss_bytes = memory.peak_bytes();
-    const Metadata metadata = frame_metadata(options_, camera, scene_.origin_world, frames[i], session_instances);
-    report.warnings = warnings_.lines();
+    report.warnings = warnings_->lines();
+    const Metadata metadata = frame_metadata(options_, scene_, camera, frames[i], session_instances);
     if (auto taken = sink(film.image(), metadata, report); !taken) return tl::unexpected(taken.error());
   }
   report.peak_rss_bytes = memory.peak_bytes();
-  report.warnings = warnings_.lines();
   return report;
 }
 

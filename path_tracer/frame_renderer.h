@@ -40,8 +40,8 @@ class FrameRenderer {
  private:
   FrameRenderer() = default;
 
-  WarningLog warnings_;
-  RenderOptions options_;  // its `warning` writes to warnings_ first
+  RenderOptions options_;  // its warnings go by way of warnings_
+  std::shared_ptr<WarningLog> warnings_;
   GltfScene scene_;
   size_t camera_ = 0;  // index into scene_.cameras
   Lights lights_;

@@ -38,9 +38,9 @@ struct RenderOptions {
   /// Command that bakes: called as BAKER bake SCENE -o DIR --mesh N ... Empty: this very program.
   std::filesystem::path baker;
   std::function<void(const std::string& line)> message;  ///< for a person who waits, one line each; may be empty
-  /// What is ignored, guessed or degraded, each line once; may be empty. Called from any thread, one at a time.
-  std::function<void(const std::string& line)> warning;
-  Job job;  ///< reports from any thread
+  std::function<void(const std::string& line)> warning;  ///< what is ignored, guessed or degraded, each line
+                                                         ///< once; from any thread; may be empty
+  Job job;                                               ///< reports from any thread
 };
 
 /// What a frame took. Bytes are the process's and the budget's; see ShotReport.
@@ -65,7 +65,7 @@ struct RenderReport {
   uint64_t peak_rss_bytes = 0;        ///< highest since then
   uint64_t peak_accounted_bytes = 0;  ///< highest that the runtime counted against the budget
   std::vector<FrameReport> frames;    ///< those that are finished, in order
-  std::vector<std::string> warnings;  ///< all that went to RenderOptions::warning, each once
+  std::vector<std::string> warnings;  ///< each once, in the order they came
 };
 
 /// Renders one frame to `out` (EXR with the channels of film.h and metadata) and to the PNG beside it.

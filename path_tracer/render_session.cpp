@@ -5,9 +5,9 @@
 
 #include <chrono>
 
+#include "base/process_memory.h"
 #include "base/result.h"
 #include "path_tracer/cryptomatte.h"
-#include "path_tracer/process_memory.h"
 
 namespace farfield {
 

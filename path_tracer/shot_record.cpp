@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "path_tracer/warning_log.h"
+
 namespace farfield {
 
 using Json = nlohmann::ordered_json;
@@ -59,8 +61,8 @@ std::string to_json(const ShotRecord& record) {
                      {"peak_rss_bytes", report.peak_rss_bytes},
                      {"peak_accounted_bytes", report.peak_accounted_bytes},
                      {"fingerprint", record.fingerprint},
-                     {"warnings", report.warnings},
                      {"assets", report.assets},
+                     {"warnings", report.warnings},
                      {"frames", frames}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -75,8 +77,8 @@ std::optional<ShotRecord> shot_record_from_json(const std::string& text) {
     json.at("peak_rss_bytes").get_to(report.peak_rss_bytes);
     json.at("peak_accounted_bytes").get_to(report.peak_accounted_bytes);
     json.at("fingerprint").get_to(record.fingerprint);
-    json.at("warnings").get_to(report.warnings);
     json.at("assets").get_to(report.assets);
+    report.warnings = json.value("warnings", std::vector<std::string>());  // absent before version 0.1
     for (const Json& frame : json.at("frames")) report.frames.push_back(frame_from_json(frame, report.assets));
     return record;
   } catch (const Json::exception&) {
@@ -88,9 +90,7 @@ RenderReport join_reports(const RenderReport& earlier, const RenderReport& later
   RenderReport joined = later.frames.empty() || beyond_baseline(earlier) > beyond_baseline(later) ? earlier : later;
   joined.peak_accounted_bytes = std::max(earlier.peak_accounted_bytes, later.peak_accounted_bytes);
   joined.warnings = earlier.warnings;
-  for (const std::string& warning : later.warnings) {
-    if (std::ranges::find(joined.warnings, warning) == joined.warnings.end()) joined.warnings.push_back(warning);
-  }
+  add_new_lines(joined.warnings, later.warnings);
   joined.frames = earlier.frames;
   joined.frames.insert(joined.frames.end(), later.frames.begin(), later.frames.end());
   std::stable_sort(joined.frames.begin(), joined.frames.end(),

@@ -15,8 +15,8 @@ struct ShotRecord {
   RenderReport report;
 };
 
-/// {"budget_bytes", "baseline_rss_bytes", "peak_rss_bytes", "peak_accounted_bytes", "fingerprint", "warnings": [...],
-/// "assets": [...], "frames": [{"frame", "seconds", "load_seconds", "accounted_bytes", "rss_bytes", "bias", "rays",
+/// {"budget_bytes", "baseline_rss_bytes", "peak_rss_bytes", "peak_accounted_bytes", "fingerprint", "assets": [...],
+/// "warnings": [...], "frames": [{"frame", "seconds", "load_seconds", "accounted_bytes", "rss_bytes", "bias", "rays",
 /// "levels_loaded", "fallbacks", "invalid_samples", "finest_level": {asset: k}}]}, indented, keys in this order, frames
 /// ascending.
 std::string to_json(const ShotRecord& record);
@@ -25,7 +25,7 @@ std::string to_json(const ShotRecord& record);
 std::optional<ShotRecord> shot_record_from_json(const std::string& text);
 
 /// Joins the report of an earlier run, whose frames are kept, with that of the run that went on with it. The memory
-/// figures are those of the run that took more beyond its baseline.
+/// figures are those of the run that took more beyond its baseline; warnings are those of both, each once.
 RenderReport join_reports(const RenderReport& earlier, const RenderReport& later);
 
 }  // namespace farfield

@@ -1,33 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
-// What was said of a job, each line once.
+// Each warning once, to a person and into the report.
 #pragma once
 
-#include <algorithm>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <vector>
 
 namespace farfield {
 
-/// Safe from any thread.
+/// Thread-safe.
 class WarningLog {
  public:
-  /// False if the line was there already.
-  bool add(const std::string& line) {
-    const std::lock_guard lock(mutex_);
-    if (std::find(lines_.begin(), lines_.end(), line) != lines_.end()) return false;
-    lines_.push_back(line);
-    return true;
-  }
-  /// In the order in which they came.
-  std::vector<std::string> lines() const {
-    const std::lock_guard lock(mutex_);
-    return lines_;
-  }
+  /// sink: told each line when it comes first; may be empty.
+  explicit WarningLog(std::function<void(const std::string& line)> sink);
+
+  void add(const std::string& line);
+  /// What was added, each once, in the order it came.
+  std::vector<std::string> lines() const;
 
  private:
+  const std::function<void(const std::string& line)> sink_;
   mutable std::mutex mutex_;
-  std::vector<std::string> lines_;
+  std::vector<std::string> lines_;  // guarded by mutex_
 };
+
+/// Adds to `lines` those of `more` that it does not have.
+void add_new_lines(std::vector<std::string>& lines, const std::vector<std::string>& more);
 
 }  // namespace farfield

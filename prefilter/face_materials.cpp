@@ -211,14 +211,14 @@ bool is_varied(const SourceSurface& source, const TrianglePart& part, float widt
   return false;
 }
 
-Surface average_faces(const SourceSurface& source) {
+Surface average_faces(const SourceSurface& source, const Job& job) {
   Surface surface;
   surface.origin = source.origin;
   surface.positions = source.positions;
   surface.triangles = source.triangles;
   surface.materials.resize(source.triangles.size());
   parallel_for(source.triangles.size(), 1024, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
+    for (size_t i = begin; i < end && !job.is_cancelled(); ++i) {
       surface.materials[i] = average_material(source, {static_cast<uint32_t>(i)});
     }
   });

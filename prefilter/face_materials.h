@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 
+#include "base/job.h"
 #include "prefilter/source_surface.h"
 #include "prefilter/surface.h"
 
@@ -32,7 +33,8 @@ bool is_varied(const SourceSurface& source, const TrianglePart& part, float widt
 inline constexpr float kVisibleStep = 0.05f;   ///< of the square root of a linear value: 13 of 255 grey levels
 inline constexpr float kVisibleAngle = 0.15f;  ///< rad
 
-/// The source's triangles, each with its average material: level 0 where close-ups cannot have more.
-Surface average_faces(const SourceSurface& source);
+/// The source's triangles, each with its average material: level 0 where close-ups cannot have more. Incomplete when
+/// cancelled.
+Surface average_faces(const SourceSurface& source, const Job& job = {});
 
 }  // namespace farfield

@@ -300,10 +300,10 @@ class DetailSplitter {
 // ---- what is left
 
 /// Materials of all parts; those that nothing stops at, or that have no area, go.
-ResolvedSurface finish(const SourceSurface& source, const PartMesh& mesh) {
+ResolvedSurface finish(const SourceSurface& source, const PartMesh& mesh, const Job& job) {
   std::vector<FaceMaterial> materials(mesh.triangles.size());
   parallel_for(materials.size(), 256, [&](size_t begin, size_t end) {
-    for (size_t f = begin; f < end; ++f) {
+    for (size_t f = begin; f < end && !job.is_cancelled(); ++f) {
       materials[f] = average_material(source, mesh.parts[f]);
       const bool is_cut =
           !source.material_function && source.material_of(mesh.parts[f].triangle).alpha_mode == AlphaMode::Mask;
@@ -345,19 +345,19 @@ ResolvedSurface finish(const SourceSurface& source, const PartMesh& mesh) {
 Result<ResolvedSurface> resolve(const SourceSurface& source, float resolution, const Job& job) {
   PartMesh mesh = MaskCutter(source, job).run();
   DetailSplitter(source, resolution, job, mesh).run();
+  ResolvedSurface resolved = finish(source, mesh, job);
   if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
-  ResolvedSurface resolved = finish(source, mesh);
   if (resolved.surface.triangles.empty()) {
     return make_error(ErrorCode::BadFile, "no face has any area that is not transparent");
   }
   return resolved;
 }
 
-uint64_t estimate_resolved_faces(const SourceSurface& source, float resolution) {
+uint64_t estimate_resolved_faces(const SourceSurface& source, float resolution, const Job& job) {
   constexpr double kFacesPerSquare = 5;  // bisection ends at edges of 0.7 to 1 times the resolution
   std::atomic<uint64_t> faces{0};        // integers, so that the order does not matter
   parallel_for(source.triangles.size(), 256, [&](size_t begin, size_t end) {
-    for (size_t f = begin; f < end; ++f) {
+    for (size_t f = begin; f < end && !job.is_cancelled(); ++f) {
       const double squares = 0.5 * glm::length(source.area_vector(f)) / (double(resolution) * resolution);
       const bool is_split = squares > 0.5 && is_varied(source, {static_cast<uint32_t>(f)}, resolution);
       faces += is_split ? std::max<uint64_t>(1, static_cast<uint64_t>(kFacesPerSquare * squares)) : 1;

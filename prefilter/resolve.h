@@ -26,6 +26,7 @@ struct ResolvedSurface {
 Result<ResolvedSurface> resolve(const SourceSurface& source, float resolution, const Job& job = {});
 
 /// About how many faces resolve() would give, from the area of what varies: for a decision, in a fraction of the time.
-uint64_t estimate_resolved_faces(const SourceSurface& source, float resolution);
+/// Too few when cancelled.
+uint64_t estimate_resolved_faces(const SourceSurface& source, float resolution, const Job& job = {});
 
 }  // namespace farfield

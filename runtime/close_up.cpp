@@ -132,6 +132,7 @@ CloseUp::CloseUp(const std::filesystem::path& folder, const Manifest& manifest, 
     to.mask_map = open(from.mask_map);
     to.has_maps = to.base_color_map || to.metallic_roughness_map || to.alpha_map || to.normal_map || to.emission_map ||
                   to.mask_map;
+    has_maps_ |= to.has_maps;
   }
   for (const AssetTexture& texture : manifest.textures) textures.add_bytes(texture.cache_bytes);
 }
@@ -148,6 +149,8 @@ float CloseUp::opacity(const TracedLevel& level, const SurfacePoint& point) cons
 }
 
 std::optional<CloseUpSample> CloseUp::sample(const LevelView& level, const SurfacePoint& point) const {
+  const bool is_plain = !function_ && !has_maps_ && level.corner_vertex.empty();
+  if (is_plain) return {};
   const Place place(level, point);
   std::optional<MaterialSample> material;
   if (function_) {
@@ -255,9 +258,7 @@ const std::string& CloseUp::material_name(uint32_t material) const {
   return material < materials_.size() ? materials_[material].name : none;
 }
 
-bool CloseUp::has_textures() const {
-  return !function_ && std::ranges::any_of(materials_, [](const Material& m) { return m.has_maps; });
-}
+bool CloseUp::has_textures() const { return !function_ && has_maps_; }
 
 uint64_t CloseUp::table_bytes() const { return sizeof(CloseUp) + materials_.capacity() * sizeof(Material); }
 

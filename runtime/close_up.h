@@ -67,6 +67,7 @@ class CloseUp final : public SurfaceLook {
   bool look_up(const Map& map, const Place& place, vec4& value) const;
 
   std::vector<Material> materials_;
+  bool has_maps_ = false;  ///< any of them
   MaterialFunction function_;
   const TextureCache& textures_;
 };

@@ -17,7 +17,7 @@ namespace {
 struct BakeArguments {
   std::string source, output, report;
   int threads = 0;
-  bool is_quiet = false;
+  bool warnings = true;
   BakeOptions options;
 };
 
@@ -40,7 +40,7 @@ Result<void> run_bake(BakeArguments& arguments) {
   const auto report = bake(arguments.source, arguments.output, arguments.options);
   progress.clear();
   if (!report) return tl::unexpected(report.error());
-  if (!arguments.is_quiet) print_warnings("bake", report->warnings);
+  if (arguments.warnings) print_warnings("bake", report->warnings);
   if (stdout_is_terminal()) print_summary(arguments, *report);
   return arguments.report.empty() ? Result<void>() : write_text_file(arguments.report, bake_report_json(*report));
 }
@@ -71,7 +71,8 @@ void add_bake_command(CLI::App& app, Action& action) {
   command->add_option("--threads", arguments->threads, "0: as many as the machine has")
       ->check(CLI::Range(0, 4096))
       ->capture_default_str();
-  command->add_flag("--quiet", arguments->is_quiet, "Leave the warnings to --report and `farfield info --json`");
+  command->add_flag("!--no-warnings", arguments->warnings,
+                    "Leave what was ignored or guessed to the manifest, as render does, which says it itself");
   command->add_option("--report", arguments->report, "Write what was done, with seconds per stage, as JSON");
   command->footer("Example:\n  farfield bake oak.obj.gz -o oak.farfield --finest-grid 512");
   command->callback([arguments, &action] { action = [arguments] { return run_bake(*arguments); }; });

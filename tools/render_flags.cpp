@@ -83,7 +83,7 @@ void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::
       ->capture_default_str();
 }
 
-Result<RenderReport> run_with_progress(const char* command, RenderArguments& arguments,
+Result<RenderReport> run_with_progress(std::string_view command, RenderArguments& arguments,
                                        const std::function<Result<RenderReport>(const RenderOptions&)>& job) {
   const ThreadLimit limit(arguments.threads);
   ProgressLine progress;

@@ -387,6 +387,41 @@ TEST_F(WholeRoad, RenderAndShotOfAScene) {
   expect_quiet_success(farfield(render));
 }
 
+/// A triangle, and a mesh "torn" whose positions reach past the end of their buffer.
+void write_scene_with_a_torn_mesh(const fs::path& path) {
+  const std::string positions = test::raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 0});
+  const std::string json = R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1]}],
+    "nodes":[{"mesh":0},{"mesh":1}],
+    "meshes":[{"name":"whole","primitives":[{"attributes":{"POSITION":0}}]},
+              {"name":"torn","primitives":[{"attributes":{"POSITION":1}}]}],
+    "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},
+                 {"bufferView":0,"componentType":5126,"count":300,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],
+    "bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36}]})";
+  write(path, test::glb(json, positions));
+}
+
+TEST(Warnings, OfABrokenMeshNameItAndTheSceneIsRendered) {
+  const fs::path folder = fresh_folder("torn_mesh");
+  const std::string scene = (folder / "scene.glb").string();
+  write_scene_with_a_torn_mesh(scene);
+  const std::vector<std::string> common = {"--size", "16x16", "--spp", "1", "--finest-grid", "16"};
+  const auto run = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), common.begin(), common.end());
+    return farfield(arguments);
+  };
+  const ProcessOutput render = run({"render", scene, "-o", (folder / "frame.exr").string()});
+  EXPECT_EQ(render.exit_code, 0) << render.err;
+  EXPECT_NE(render.err.find("farfield render: warning: "), std::string::npos) << render.err;
+  EXPECT_NE(render.err.find("\"torn\""), std::string::npos) << render.err;
+
+  const ProcessOutput shot = run({"shot", scene, "--frames", "0-1", "-o", (folder / "shot").string()});
+  EXPECT_EQ(shot.exit_code, 0) << shot.err;
+  EXPECT_NE(shot.err.find("farfield shot: warning: "), std::string::npos) << shot.err;
+  const Json report = Json::parse(contents(folder / "shot/shot.json"));
+  ASSERT_EQ(report["warnings"].size(), 1u) << report["warnings"];
+  EXPECT_NE(report["warnings"][0].get<std::string>().find("\"torn\""), std::string::npos);
+}
+
 TEST(Interrupt, ABakeStopsInOrderAndGoesOnLater) {
   const fs::path folder = fresh_folder("interrupt_bake");
   const std::string bush = (folder / "bush.obj").string(), asset = (folder / "bush.farfield").string();

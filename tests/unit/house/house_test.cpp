@@ -139,7 +139,7 @@ TEST(House, EveryCitationIsInTheReferences) {
 TEST(House, DocumentsNameFilesAndSectionsThatExist) {
   std::set<std::string> paths;
   for (const auto& [room, unused] : documented_arrows()) {
-    for (const SourceFile& file : files_in(room, {".h", ".cpp", ".cmake", ".txt"})) paths.insert(file.name);
+    for (const SourceFile& file : files_in(room, {".h", ".cpp", ".cmake", ".txt", ".py"})) paths.insert(file.name);
   }
   for (const char* folder : {"docs", "scripts"}) {
     for (const SourceFile& file : files_in(folder, {".md", ".py", ".txt"})) paths.insert(file.name);

@@ -40,6 +40,57 @@ std::string scene_file(const std::string& nodes, const std::string& roots, const
   return glb(json, triangle + extra);
 }
 
+TEST(GltfScene, LightsOfMapCoordinatesMoveAlong) {
+  const TemporaryFolder folder;
+  const std::string light = R"("extensions":{"KHR_lights_punctual":{"lights":[{"type":"point"}]}})";
+  const auto scene = read_gltf_scene(folder.write("far.glb", scene_file(
+                                                                 R"({"mesh":0,"translation":[4500000,0,0]},
+         {"translation":[4500000,2.125,0],"extensions":{"KHR_lights_punctual":{"light":0}}})",
+                                                                 "0,1", light)));
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->lights.size(), 1u);
+  EXPECT_LT(distance(scene->lights[0].position - scene->instances[0].to_world[3], vec3(0, 2.125f, 0)), 1e-6f);
+}
+
+TEST(GltfScene, InstancesInMapCoordinatesCountForTheOrigin) {
+  const TemporaryFolder folder;
+  const auto scene = read_gltf_scene(
+      folder.write("far.glb", scene_file(R"({"mesh":0,"translation":[0.125,0,0],
+                     "extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":1}}}})",
+                                         "0", "", raw<float>({4500000, 0, 0, 4500002, 0, 0}),
+                                         R"({"bufferView":1,"componentType":5126,"count":2,"type":"VEC3"})")));
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->instances.size(), 2u);
+  EXPECT_NEAR(scene->origin_world.x, 4500001, 2);
+  for (size_t i = 0; i < 2; ++i) {
+    EXPECT_DOUBLE_EQ(scene->origin_world.x + static_cast<double>(scene->instances[i].to_world[3].x),
+                     4500000.125 + 2.0 * static_cast<double>(i));
+  }
+}
+
+TEST(GltfScene, AMeshWhosePointsAreFarFromItsOriginIsWarnedAbout) {
+  const TemporaryFolder folder;
+  std::string file = scene_file(R"({"mesh":0})", "0", "", "",
+                                R"({"componentType":5126,"count":3,"type":"VEC3","min":[9e6,0,0],"max":[9e6,1,0]})");
+  const std::string near = R"("POSITION":0)", far = R"("POSITION":1)";
+  const auto scene = read_gltf_scene(folder.write("far.glb", file.replace(file.find(near), near.size(), far)));
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->warnings.size(), 1u);
+  EXPECT_NE(scene->warnings[0].find("mesh tri"), std::string::npos) << scene->warnings[0];
+}
+
+TEST(GltfScene, OneBrokenMeshIsLeftOutByName) {
+  const TemporaryFolder folder;
+  std::string file =
+      scene_file(R"({"mesh":0},{"mesh":0})", "0,1", "", "", R"({"componentType":5126,"count":3,"type":"VEC2"})");
+  const std::string whole = R"("POSITION":0}}]})", torn = R"("POSITION":1}}]})";
+  const auto broken = read_gltf_scene(folder.write("torn.glb", file.replace(file.find(whole), whole.size(), torn)));
+  ASSERT_TRUE(broken) << broken.error().message;
+  EXPECT_EQ(broken->meshes.at(0).triangle_count, 0u);
+  ASSERT_EQ(broken->warnings.size(), 1u);
+  EXPECT_NE(broken->warnings[0].find("mesh 0 (tri)"), std::string::npos) << broken->warnings[0];
+}
+
 TEST(GltfScene, ForestHasItsInstancesSpeciesSunAndCamera) {
   const fs::path file = kAssets / "forest/forest_pullback.glb";
   if (!fs::exists(file)) GTEST_SKIP() << file << " is not here";

@@ -79,30 +79,35 @@ TEST_F(AssetLibrary, LiesBesideTheSceneByDefault) {
   EXPECT_EQ(asset_library_folder(options_), folder_.path() / "scenes" / "farfield-assets" / "forest");
 }
 
-TEST_F(AssetLibrary, OneBrokenMeshStopsNoScene) {
-  std::vector<std::string> warnings;
-  options_.warning = [&](const std::string& line) { warnings.push_back(line); };
-  set_baker("case \"$*\" in *maple*) exit 3;; esac");
-  const auto folders = find_or_bake_assets(scene_, options_);
-  ASSERT_TRUE(folders) << folders.error().message;
-  EXPECT_EQ((*folders)[0], "");
-  EXPECT_EQ((*folders)[3].filename(), "ground.farfield");
-  EXPECT_EQ(warnings, std::vector<std::string>{"baking mesh 0 \"maple\" failed (exit code 3); it is left out"});
-}
-
-TEST_F(AssetLibrary, WithoutAnyMeshThereIsNothingToShow) {
+TEST_F(AssetLibrary, FailedBakeNamesTheMeshAndHowItEnded) {
   set_baker("exit 3");
   const auto folders = find_or_bake_assets(scene_, options_);
   ASSERT_FALSE(folders);
   EXPECT_NE(folders.error().message.find("maple"), std::string::npos);
   EXPECT_NE(folders.error().message.find("exit code 3"), std::string::npos);
-  EXPECT_EQ(calls().size(), 2u);
-}
-
-TEST_F(AssetLibrary, AKilledBakeIsAnError) {
+  EXPECT_EQ(calls().size(), 1u);
   set_baker("kill -9 $$");
   EXPECT_NE(find_or_bake_assets(scene_, options_).error().message.find("signal 9"), std::string::npos);
-  EXPECT_EQ(calls().size(), 1u);
+}
+
+TEST_F(AssetLibrary, OneBrokenMeshIsAWarningAndTheOthersAreThere) {
+  std::vector<std::string> warnings;
+  options_.warning = [&](const std::string& line) { warnings.push_back(line); };
+  set_baker("case \"$*\" in *maple*) exit 1;; esac");
+  const auto folders = find_or_bake_assets(scene_, options_);
+  ASSERT_TRUE(folders) << folders.error().message;
+  EXPECT_EQ((*folders)[0], "");
+  EXPECT_EQ((*folders)[3].filename(), "ground.farfield");
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("mesh 0 \"maple\""), std::string::npos) << warnings[0];
+}
+
+TEST_F(AssetLibrary, ASceneOfBrokenMeshesAloneIsAnError) {
+  set_baker("exit 1");
+  const auto folders = find_or_bake_assets(scene_, options_);
+  ASSERT_FALSE(folders);
+  EXPECT_NE(folders.error().message.find("maple"), std::string::npos);
+  EXPECT_EQ(calls().size(), 2u);
 }
 
 TEST_F(AssetLibrary, MissingBakerIsAnError) {

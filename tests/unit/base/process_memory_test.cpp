@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "path_tracer/process_memory.h"
+#include "base/process_memory.h"
 
 #include <gtest/gtest.h>
 #include <sys/mman.h>

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// farfield/bake.h over the rooms that do the work.
+#include <fmt/format.h>
+
+#include <new>
+
+#include "bake/bake.h"
+#include "bake_api/memory_guard.h"
+#include "bake_api/source_from_input.h"
+#include "base/bytes.h"
+#include "base/parallel.h"
+#include "base/result.h"
+#include "farfield/bake.h"
+
+namespace farfield {
+namespace {
+
+BakeOptions bake_options(const BakeSettings& settings, const MemoryGuard& guard) {
+  BakeOptions options;
+  options.finest_grid = settings.finest_grid;
+  options.coarsest_grid = settings.coarsest_grid;
+  options.rays_per_voxel = settings.rays_per_voxel;
+  options.source_only = settings.source_only;
+  options.job.cancel = guard.cancel();
+  if (settings.progress) {
+    // Voxels are counted by whichever thread did them.
+    options.job.progress = [&settings, mutex = std::make_shared<std::mutex>()](double done, const std::string& stage) {
+      const std::lock_guard lock(*mutex);
+      settings.progress(done, stage);
+    };
+  }
+  return options;
+}
+
+BakeSummary summary_of(const BakeReport& report) {
+  BakeSummary summary;
+  for (const LevelEntry& entry : report.manifest.levels) {
+    summary.levels.push_back({entry.level, entry.grid, entry.resolution, entry.triangles, entry.voxels,
+                              entry.file_bytes, entry.resident_bytes});
+  }
+  summary.warnings = report.warnings;
+  summary.seconds = report.total_seconds;
+  summary.is_up_to_date = report.up_to_date;
+  return summary;
+}
+
+tl::unexpected<Error> out_of_memory(const std::string& needed) {
+  return make_error(ErrorCode::OutOfBudget,
+                    "bake: " + needed + "; allow more memory, lower the finest grid, or bake the input in parts");
+}
+
+/// Runs a bake within the settings' limits, and says it as one of those if it was ended by one.
+template <typename Run>
+Result<BakeSummary> run_limited(const BakeSettings& settings, const Run& run) {
+  if (settings.threads < 0) {
+    return make_error(ErrorCode::InvalidArgument, fmt::format("bake: {} threads", settings.threads));
+  }
+  const ThreadLimit threads(settings.threads);
+  const MemoryGuard guard(settings.memory_limit_bytes, settings.cancel);
+  try {
+    const Result<BakeReport> report = run(bake_options(settings, guard));
+    if (report) return summary_of(*report);
+    if (report.error().code == ErrorCode::Cancelled && guard.exceeded_bytes() > 0) {
+      return out_of_memory(fmt::format("it took {} where {} are allowed", format_bytes(guard.exceeded_bytes()),
+                                       format_bytes(settings.memory_limit_bytes)));
+    }
+    return tl::unexpected(report.error());
+  } catch (const std::bad_alloc&) {
+    return out_of_memory("the system has no more memory");
+  }
+}
+
+}  // namespace
+
+Result<BakeSummary> bake_meshes(const BakeInput& input, const std::string& folder, const BakeSettings& settings) {
+  return run_limited(settings, [&](BakeOptions options) -> Result<BakeReport> {
+    options.job.report(0, "import");
+    FARFIELD_TRY_LET(SourceMesh mesh, source_from_input(input));
+    FARFIELD_TRY_LET(ImportedAsset asset, condition(std::move(mesh), input.name));
+    // What a function answers is not in the hash.
+    options.even_if_up_to_date = input.material_function && input.material_key.empty();
+    return bake(std::move(asset), input.name, folder, options);
+  });
+}
+
+Result<BakeSummary> bake_file(const std::string& source, const std::string& folder, const BakeSettings& settings,
+                              int mesh) {
+  return run_limited(settings, [&](BakeOptions options) -> Result<BakeReport> {
+    options.import.mesh = mesh;
+    return bake(source, folder, options);
+  });
+}
+
+}  // namespace farfield

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bake_api/gather_mesh.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "base/index.h"
+
+namespace farfield {
+namespace {
+
+constexpr uint64_t kMostElements = kNoIndex;  // 32-bit indices, one of which means none
+
+/// How messages call a mesh, and how they say what is wrong with it.
+class MeshName {
+ public:
+  MeshName(const BakeMesh& mesh, size_t index)
+      : text_(mesh.name.empty() ? fmt::format("mesh {}", index) : fmt::format("mesh {} ({})", index, mesh.name)) {}
+
+  const std::string& text() const { return text_; }
+  template <typename... Values>
+  tl::unexpected<Error> error(fmt::format_string<Values...> format, Values&&... values) const {
+    return make_error(ErrorCode::InvalidArgument, text_ + ": " + fmt::format(format, std::forward<Values>(values)...));
+  }
+
+ private:
+  std::string text_;
+};
+
+/// The whole number in a row, if it is one in [0, limit).
+std::optional<uint32_t> whole_number(const BakeRows<1>& rows, size_t row, uint64_t limit) {
+  const double value = rows.at(row);
+  if (!(value >= 0) || value >= static_cast<double>(limit) || value != std::floor(value)) return std::nullopt;
+  return static_cast<uint32_t>(value);
+}
+
+/// The first row that has a number that is not finite in the type in which it will be kept.
+template <typename Kept, int N>
+std::optional<size_t> find_not_finite(const BakeRows<N>& rows) {
+  for (size_t row = 0; row < rows.size(); ++row) {
+    for (int column = 0; column < N; ++column) {
+      if (!std::isfinite(static_cast<Kept>(rows.at(row, column)))) return row;
+    }
+  }
+  return std::nullopt;
+}
+
+// ---- checks
+
+size_t face_count(const BakeMesh& mesh) { return mesh.counts.empty() ? mesh.corners.size() / 3 : mesh.counts.size(); }
+
+Result<void> check_counts(const BakeMesh& mesh, const MeshName& name) {
+  const size_t corners = mesh.corners.size();
+  if (mesh.counts.empty()) {
+    if (corners % 3 == 0) return {};
+    return name.error("{} corners are no whole triangles; give the corners of each face as counts", corners);
+  }
+  uint64_t sum = 0;
+  for (size_t face = 0; face < mesh.counts.size(); ++face) {
+    const auto count = whole_number(mesh.counts, face, kMostElements);
+    if (!count || *count < 3) return name.error("face {} has {} corners; 3 are the fewest", face, mesh.counts.at(face));
+    sum += *count;
+  }
+  if (sum == corners) return {};
+  return name.error("the counts of {} faces add up to {}, but there are {} corners", mesh.counts.size(), sum, corners);
+}
+
+Result<void> check_corners(const BakeMesh& mesh, const MeshName& name) {
+  for (size_t i = 0; i < mesh.corners.size(); ++i) {
+    if (whole_number(mesh.corners, i, std::min<uint64_t>(mesh.points.size(), kMostElements))) continue;
+    return name.error("corner {} has point {}; there are points 0 to {}", i, mesh.corners.at(i),
+                      static_cast<int64_t>(mesh.points.size()) - 1);
+  }
+  return {};
+}
+
+Result<void> check_materials(const BakeMesh& mesh, const MeshName& name, const BakeInput& input) {
+  const size_t faces = face_count(mesh);
+  if (!mesh.materials.empty() && mesh.materials.size() != faces) {
+    return name.error("{} material ids for {} faces; one for each, or none", mesh.materials.size(), faces);
+  }
+  // Faces of a mesh without ids have id 0.
+  const bool is_complete = !input.material_function && !input.materials.empty();
+  const uint64_t limit = is_complete ? input.materials.size() : kMaxMaterials;
+  for (size_t face = 0; face < mesh.materials.size(); ++face) {
+    if (whole_number(mesh.materials, face, limit)) continue;
+    return name.error("face {} has material {}; there are materials 0 to {}", face, mesh.materials.at(face), limit - 1);
+  }
+  return {};
+}
+
+template <int N>
+Result<void> check_attribute(const BakeAttribute<N>& attribute, const BakeMesh& mesh, const MeshName& name,
+                             const char* what) {
+  if (attribute.values.empty()) return {};
+  const bool is_per_point = attribute.per == BakePer::Point;
+  const size_t wanted = is_per_point ? mesh.points.size() : mesh.corners.size();
+  if (attribute.values.size() != wanted) {
+    return name.error("{} {} for {} {}; one for each, or none", attribute.values.size(), what, wanted,
+                      is_per_point ? "points" : "corners");
+  }
+  if (const auto row = find_not_finite<float>(attribute.values)) {
+    return name.error("{} {} are not finite", what, *row);
+  }
+  return {};
+}
+
+Result<void> check_mesh(const BakeMesh& mesh, const MeshName& name, const BakeInput& input) {
+  if (const auto point = find_not_finite<double>(mesh.points)) return name.error("point {} is not finite", *point);
+  FARFIELD_TRY(check_counts(mesh, name));
+  FARFIELD_TRY(check_corners(mesh, name));
+  FARFIELD_TRY(check_materials(mesh, name, input));
+  FARFIELD_TRY(check_attribute(mesh.uv, mesh, name, "uv coordinates"));
+  FARFIELD_TRY(check_attribute(mesh.normals, mesh, name, "normals"));
+  return check_attribute(mesh.colors, mesh, name, "colors");
+}
+
+Result<void> check_instance(const BakeInstance& instance, size_t index, size_t mesh_count) {
+  const auto error = [&](const std::string& what) {
+    return make_error(ErrorCode::InvalidArgument, fmt::format("instance {}: {}", index, what));
+  };
+  if (instance.mesh >= mesh_count) return error(fmt::format("mesh {} of {}", instance.mesh, mesh_count));
+  for (int column = 0; column < 4; ++column) {
+    const dvec3& c = instance.to_asset[column];
+    if (!std::isfinite(c.x) || !std::isfinite(c.y) || !std::isfinite(c.z)) return error("its transform is not finite");
+  }
+  const double determinant = glm::determinant(glm::dmat3(instance.to_asset));
+  if (determinant == 0 || !std::isfinite(determinant)) return error("its transform cannot be inverted");
+  return {};
+}
+
+// ---- copies
+
+/// What the meshes have between them: an attribute that one lacks is filled up for it.
+struct Attributes {
+  bool uv = false, normals = false, colors = false;
+};
+
+Attributes attributes_of(const std::vector<BakeMesh>& meshes) {
+  Attributes has;
+  for (const BakeMesh& mesh : meshes) {
+    has.uv |= !mesh.uv.values.empty();
+    has.normals |= !mesh.normals.values.empty();
+    has.colors |= !mesh.colors.values.empty();
+  }
+  return has;
+}
+
+template <int N>
+glm::vec<N, float> row_of(const BakeRows<N>& rows, size_t row) {
+  glm::vec<N, float> out;
+  for (int column = 0; column < N; ++column) out[column] = static_cast<float>(rows.at(row, column));
+  return out;
+}
+
+/// The attribute at corner `corner`, which has the point `point`.
+template <int N>
+glm::vec<N, float> value_at(const BakeAttribute<N>& attribute, size_t corner, size_t point,
+                            const glm::vec<N, float>& missing) {
+  if (attribute.values.empty()) return missing;
+  return row_of(attribute.values, attribute.per == BakePer::Point ? point : corner);
+}
+
+/// Appends one instance of a checked mesh.
+void append(const BakeMesh& mesh, const glm::dmat4x3& to_asset, const Attributes& has, SourceMesh& out) {
+  const auto first_position = static_cast<uint32_t>(out.positions.size());
+  for (size_t i = 0; i < mesh.points.size(); ++i) {
+    out.positions.push_back(to_asset * glm::dvec4(mesh.points.at(i, 0), mesh.points.at(i, 1), mesh.points.at(i, 2), 1));
+  }
+  const glm::dmat3 linear(to_asset);
+  const glm::dmat3 of_normals = glm::transpose(glm::inverse(linear));
+  // A mirror image winds the other way; turned round, its faces agree with its normals again.
+  const bool is_mirrored = glm::determinant(linear) < 0;
+  size_t begin = 0;
+  for (size_t face = 0; face < face_count(mesh); ++face) {
+    const size_t count = mesh.counts.empty() ? 3 : static_cast<size_t>(mesh.counts.at(face));
+    for (size_t i = 0; i < count; ++i) {
+      const size_t corner = is_mirrored ? begin + count - 1 - i : begin + i;
+      const auto point = static_cast<uint32_t>(mesh.corners.at(corner));
+      out.corner_position.push_back(first_position + point);
+      if (has.uv) {
+        out.corner_uv.push_back(value_at(mesh.uv, corner, point, vec2(std::numeric_limits<float>::quiet_NaN())));
+      }
+      if (has.normals) {
+        const dvec3 normal = of_normals * dvec3(value_at(mesh.normals, corner, point, vec3(0.0f)));
+        const double length = glm::length(normal);
+        out.corner_normal.push_back(length > 0 ? vec3(normal / length) : vec3(0.0f));
+      }
+      if (has.colors) out.corner_color.push_back(value_at(mesh.colors, corner, point, vec4(1.0f)));
+    }
+    begin += count;
+    out.face_begin.push_back(static_cast<uint32_t>(out.corner_position.size()));
+    out.face_material.push_back(mesh.materials.empty() ? 0 : static_cast<uint32_t>(mesh.materials.at(face)));
+  }
+}
+
+std::vector<BakeInstance> each_mesh_once(size_t mesh_count) {
+  std::vector<BakeInstance> instances(mesh_count);
+  for (size_t i = 0; i < mesh_count; ++i) instances[i].mesh = static_cast<uint32_t>(i);
+  return instances;
+}
+
+}  // namespace
+
+Result<SourceMesh> gather_mesh(const BakeInput& input) {
+  SourceMesh out;
+  for (size_t i = 0; i < input.meshes.size(); ++i) {
+    const MeshName name(input.meshes[i], i);
+    FARFIELD_TRY(check_mesh(input.meshes[i], name, input));
+    if (face_count(input.meshes[i]) == 0) out.warnings.push_back(name.text() + ": has no faces");
+  }
+  const auto instances = input.instances.empty() ? each_mesh_once(input.meshes.size()) : input.instances;
+  uint64_t points = 0, corners = 0;
+  for (size_t i = 0; i < instances.size(); ++i) {
+    FARFIELD_TRY(check_instance(instances[i], i, input.meshes.size()));
+    points += input.meshes[instances[i].mesh].points.size();
+    corners += input.meshes[instances[i].mesh].corners.size();
+  }
+  if (corners == 0) return make_error(ErrorCode::InvalidArgument, "bake: there is no face in any mesh that is shown");
+  if (points >= kMostElements || corners >= kMostElements) {
+    return make_error(ErrorCode::Unsupported,
+                      fmt::format("bake: {} points and {} corners, with all instances, are more than one asset holds; "
+                                  "bake parts of it",
+                                  points, corners));
+  }
+  out.positions.reserve(points);
+  out.corner_position.reserve(corners);
+  const Attributes has = attributes_of(input.meshes);
+  for (const BakeInstance& instance : instances) append(input.meshes[instance.mesh], instance.to_asset, has, out);
+  return out;
+}
+
+}  // namespace farfield

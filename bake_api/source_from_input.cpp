@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bake_api/source_from_input.h"
+
+#include <algorithm>
+#include <map>
+
+#include "bake_api/gather_materials.h"
+#include "bake_api/gather_mesh.h"
+#include "base/hash.h"
+
+namespace farfield {
+namespace {
+
+/// Goes up when the same input comes to mean something else.
+constexpr uint64_t kInputVersion = 1;
+
+/// The hash of a sequence of things, in order. Arrays are hashed with their lengths, so that neighbours do not run into
+/// each other.
+class ContentHash {
+ public:
+  template <typename T>
+  void add(const std::vector<T>& values) {
+    hash_ = hash_values<T>(values, mix64(hash_, values.size()));
+  }
+  template <typename T>
+  void add(const T& value) {
+    static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>);
+    hash_ = hash_values<T>({&value, 1}, hash_);
+  }
+  void add(const vec3& value) { hash_ = hash_values<float>({&value.x, 3}, hash_); }
+  void add(const std::string& text) { hash_ = hash_values<char>(text, mix64(hash_, text.size())); }
+  uint64_t value() const { return hash_; }
+
+ private:
+  uint64_t hash_ = kInputVersion;
+};
+
+/// By what it shows, not by what its file is called.
+class TextureHashes {
+ public:
+  uint64_t of(const SourceTexture& texture) {
+    if (!texture) return 0;
+    uint64_t& hash = of_image_[texture.image.get()];
+    if (hash == 0) {
+      ContentHash content;
+      content.add(texture.image->width());
+      content.add(texture.image->level(0).texels);
+      hash = content.value();
+    }
+    return mix64(mix64(hash, static_cast<uint64_t>(texture.wrap_u)), static_cast<uint64_t>(texture.wrap_v));
+  }
+
+ private:
+  std::map<const Texture*, uint64_t> of_image_;
+};
+
+void add_material(const SourceMaterial& m, TextureHashes& textures, ContentHash& hash) {
+  hash.add(m.name);
+  for (const vec3& color : {m.base_color, m.dielectric_f0, m.diffuse_transmission_color, m.emission}) hash.add(color);
+  for (const float factor : {m.alpha, m.metallic, m.roughness, m.diffuse_transmission, m.alpha_cutoff, m.normal_scale,
+                             m.thin_transmission}) {
+    hash.add(factor);
+  }
+  hash.add(m.alpha_mode);
+  for (const SourceTexture* map :
+       {&m.base_color_map, &m.metallic_roughness_map, &m.alpha_map, &m.normal_map, &m.emission_map}) {
+    hash.add(textures.of(*map));
+  }
+}
+
+uint64_t hash_of(const SourceMesh& mesh, const std::string& material_key) {
+  ContentHash hash;
+  hash.add(mesh.positions);
+  hash.add(mesh.face_begin);
+  hash.add(mesh.corner_position);
+  hash.add(mesh.corner_uv);
+  hash.add(mesh.corner_normal);
+  hash.add(mesh.corner_color);
+  hash.add(mesh.face_material);
+  TextureHashes textures;
+  for (const SourceMaterial& material : mesh.materials) add_material(material, textures, hash);
+  hash.add(static_cast<bool>(mesh.material_function));
+  hash.add(material_key);
+  return hash.value();
+}
+
+}  // namespace
+
+Result<SourceMesh> source_from_input(const BakeInput& input) {
+  FARFIELD_TRY_LET(SourceMesh mesh, gather_mesh(input));
+  const uint32_t highest = *std::max_element(mesh.face_material.begin(), mesh.face_material.end());
+  FARFIELD_TRY_LET(mesh.materials, gather_materials(input, size_t{highest} + 1));
+  mesh.material_function = input.material_function;
+  mesh.source_hash = hash_of(mesh, input.material_key);
+  return mesh;
+}
+
+}  // namespace farfield

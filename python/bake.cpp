@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// farfield/bake.h for Python. farfield/__init__.py has brought all arrays into one shape.
+#include "python/bake.h"
+
+#include "farfield/bake.h"
+#include "python/materials.h"
+
+namespace farfield::python {
+namespace {
+
+template <typename T>
+using Array = py::array_t<T, py::array::c_style | py::array::forcecast>;
+
+/// An array's rows of N numbers; none for None.
+template <int N, typename T>
+BakeRows<N> to_rows(const py::handle& value, KeptArrays& arrays) {
+  if (value.is_none()) return {};
+  auto array = value.cast<Array<T>>();
+  const BakeRows<N> rows(array.data(), static_cast<size_t>(array.size() / N));
+  arrays.push_back(std::move(array));
+  return rows;
+}
+
+/// (values, is per point); None: the mesh does not have it.
+template <int N>
+BakeAttribute<N> to_attribute(const py::handle& value, KeptArrays& arrays) {
+  if (value.is_none()) return {};
+  const auto pair = value.cast<py::tuple>();
+  return {to_rows<N, float>(pair[0], arrays), pair[1].cast<bool>() ? BakePer::Point : BakePer::Corner};
+}
+
+BakeMesh to_mesh(const py::dict& fields, KeptArrays& arrays) {
+  BakeMesh mesh;
+  mesh.name = fields["name"].cast<std::string>();
+  mesh.points = to_rows<3, double>(fields["points"], arrays);
+  mesh.corners = to_rows<1, int64_t>(fields["corners"], arrays);
+  mesh.counts = to_rows<1, int64_t>(fields["counts"], arrays);
+  mesh.materials = to_rows<1, int64_t>(fields["material_ids"], arrays);
+  mesh.uv = to_attribute<2>(fields["uv"], arrays);
+  mesh.normals = to_attribute<3>(fields["normals"], arrays);
+  mesh.colors = to_attribute<4>(fields["colors"], arrays);
+  return mesh;
+}
+
+/// (mesh, its transform as a 3 x 4 array).
+BakeInstance to_instance(const py::tuple& pair) {
+  BakeInstance instance;
+  instance.mesh = pair[0].cast<uint32_t>();
+  const auto matrix = pair[1].cast<Array<double>>();
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) instance.to_asset[column][row] = matrix.at(row, column);
+  return instance;
+}
+
+BakeSettings to_settings(const py::dict& fields, LongCall& call, bool has_progress) {
+  BakeSettings settings;
+  settings.finest_grid = fields["finest_grid"].cast<uint32_t>();
+  settings.coarsest_grid = fields["coarsest_grid"].cast<uint32_t>();
+  settings.rays_per_voxel = fields["rays_per_voxel"].cast<uint32_t>();
+  settings.source_only = fields["source_only"].cast<bool>();
+  settings.threads = fields["threads"].cast<int>();
+  settings.memory_limit_bytes = fields["memory_limit_bytes"].cast<uint64_t>();
+  settings.cancel = &call.cancel();
+  if (has_progress) settings.progress = [&call](double done, const std::string& stage) { call.report(done, stage); };
+  return settings;
+}
+
+py::dict to_dict(const BakeSummary& summary) {
+  using namespace py::literals;
+  py::list levels, warnings;
+  for (const BakedLevel& level : summary.levels) {
+    levels.append(py::dict("level"_a = level.level, "grid"_a = level.grid, "resolution"_a = level.resolution,
+                           "triangles"_a = level.triangles, "voxels"_a = level.voxels,
+                           "bytes_disk"_a = level.file_bytes, "bytes_resident"_a = level.resident_bytes));
+  }
+  for (const std::string& warning : summary.warnings) warnings.append(warning);
+  return py::dict("levels"_a = levels, "warnings"_a = warnings, "seconds"_a = summary.seconds,
+                  "up_to_date"_a = summary.is_up_to_date);
+}
+
+py::dict bake_arrays(const std::string& folder, const std::string& name, const py::list& meshes,
+                     const py::list& instances, const py::object& materials, const std::string& material_key,
+                     const py::dict& settings, const py::object& progress) {
+  LongCall call(progress);
+  KeptArrays arrays;
+  BakeInput input;
+  input.name = name;
+  for (const auto& mesh : meshes) input.meshes.push_back(to_mesh(mesh.cast<py::dict>(), arrays));
+  for (const auto& instance : instances) input.instances.push_back(to_instance(instance.cast<py::tuple>()));
+  if (py::isinstance<py::function>(materials)) {
+    input.material_function = to_material_function(materials.cast<py::function>(), call);
+    input.material_key = material_key;
+  } else {
+    for (const auto& material : materials.cast<py::list>())
+      input.materials.push_back(to_material(material.cast<py::dict>(), arrays));
+  }
+  const BakeSettings limits = to_settings(settings, call, !progress.is_none());
+  return to_dict(call.run([&] { return bake_meshes(input, folder, limits); }));
+}
+
+py::dict bake_source_file(const std::string& source, const std::string& folder, int mesh, const py::dict& settings,
+                          const py::object& progress) {
+  LongCall call(progress);
+  const BakeSettings limits = to_settings(settings, call, !progress.is_none());
+  return to_dict(call.run([&] { return bake_file(source, folder, limits, mesh); }));
+}
+
+}  // namespace
+
+void define_bake(py::module_& module) {
+  module.def("bake_meshes", &bake_arrays);
+  module.def("bake_file", &bake_source_file);
+}
+
+}  // namespace farfield::python

@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Farfield: levels of detail for path tracers. Bake meshes to assets, look at assets, render them.
+
+    import farfield
+    mesh = farfield.Mesh(points, faces)                       # numpy arrays
+    farfield.bake(mesh, "oak.farfield", materials=[{"base_color": (0.4, 0.3, 0.2)}])
+    picture = farfield.render("oak.farfield", width=640, height=360)    # (360, 640, 3), linear, float32
+
+Colours are linear RGB. Texture coordinates have v pointing down the image: (0, 0) is the first pixel of its first row.
+Transforms are for column vectors: the translation is the last column. What fails raises farfield.Error or, where an
+array does not fit, ValueError. docs/bake_api.md tells more.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings as _warnings
+from dataclasses import dataclass
+from typing import Any, Callable, Iterable, Mapping, Sequence, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _arrays, _farfield
+from ._errors import Error
+from ._farfield import MaterialQuery
+
+__all__ = ["Asset", "Error", "MaterialQuery", "Mesh", "bake", "bake_file", "evaluate", "info", "open", "render"]
+__version__: str = _farfield.version
+
+Path = Union[str, "os.PathLike[str]"]
+Progress = Callable[[float, str], Any]
+MaterialFunction = Callable[[MaterialQuery], Mapping[str, Any]]
+
+
+@dataclass
+class Mesh:
+    """Polygons.
+
+    points: (n, 3). faces: (m, k) integers, or a list of faces of any lengths, or flat with `counts`, the number of
+    corners of each face. uv (.., 2), normals (.., 3; of length 0: the face's own) and colors (.., 3 or 4; linear) have
+    a row per point or per corner; of shape (m, k, ..) they are per corner. material_ids: one per face; without them 0.
+    """
+
+    points: npt.ArrayLike
+    faces: Any
+    counts: npt.ArrayLike | None = None
+    uv: npt.ArrayLike | None = None
+    normals: npt.ArrayLike | None = None
+    colors: npt.ArrayLike | None = None
+    material_ids: npt.ArrayLike | None = None
+    name: str = ""
+
+    def _arrays(self) -> dict[str, Any]:
+        points = _arrays.rows(self.points, 3, "points")
+        corners, counts = _arrays.faces(self.faces, self.counts)
+        ids = None if self.material_ids is None else _arrays.integers(self.material_ids, "material_ids").ravel()
+
+        def attribute(name: str, columns: int) -> tuple[np.ndarray, bool] | None:
+            return _arrays.attribute(getattr(self, name), columns, len(points), corners, name)
+
+        return {
+            "name": self.name,
+            "points": points,
+            "corners": corners,
+            "counts": counts,
+            "material_ids": ids,
+            "uv": attribute("uv", 2),
+            "normals": attribute("normals", 3),
+            "colors": attribute("colors", 4),
+        }
+
+
+def bake(
+    meshes: Mesh | Iterable[Mesh],
+    out: Path,
+    *,
+    instances: Sequence[tuple[int, npt.ArrayLike]] | None = None,
+    materials: MaterialFunction | Sequence[Mapping[str, Any]] | npt.NDArray[Any] | None = None,
+    material_key: str = "",
+    name: str = "memory",
+    finest_grid: int = 512,
+    coarsest_grid: int = 8,
+    rays_per_voxel: int = 200,
+    source_only: bool = False,
+    threads: int = 0,
+    memory_limit: int = 0,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Bakes meshes into the folder `out` (by convention NAME.farfield) and returns what was made: its levels (dicts with
+    level, grid, resolution, triangles, voxels, bytes_disk, bytes_resident), warnings, seconds, up_to_date.
+
+    instances: (index of a mesh, 4 x 4 or 3 x 4 matrix) for every place of a mesh; without them each is there once.
+    materials: by material id, dictionaries with any of base_color, alpha, alpha_mode ("opaque", "mask", "blend"),
+    alpha_cutoff, metallic, roughness, specular_f0, diffuse_transmission, diffuse_transmission_color,
+    thin_transmission, emission, normal_scale, name, and base_color_texture, roughness_texture (G roughness, B
+    metallic), alpha_texture, normal_texture, emission_texture: file names or arrays (height, width, 3 or 4), uint8
+    (colours: sRGB) or linear floats, each with base_color_wrap and so on: "repeat", "clamp", "mirror". Or an (n, 3)
+    array of base colours. Or a function of a MaterialQuery that returns a dictionary with any of diffuse, specular,
+    roughness, transmission, opacity, normal, emission: called from several threads in turn, a few microseconds each;
+    the same query must get the same answer. material_key stands for its answers: without one, every call bakes anew.
+
+    memory_limit: bytes that the process may grow by; 0 is no limit. progress: called with (done in [0, 1], stage); what
+    it raises ends the bake. Ctrl-C ends it too; the next call goes on from there.
+    """
+    all_meshes = [meshes] if isinstance(meshes, Mesh) else list(meshes)
+    arrays = []
+    for i, mesh in enumerate(all_meshes):
+        try:
+            arrays.append(mesh._arrays())
+        except ValueError as unfit:
+            raise ValueError(f"mesh {i}{f' ({mesh.name})' if mesh.name else ''}: {unfit}") from None
+    settings = _settings(finest_grid, coarsest_grid, rays_per_voxel, source_only, threads, memory_limit)
+    placed = _arrays.instances(instances, len(all_meshes))
+    looks = _arrays.materials(materials)
+    return _farfield.bake_meshes(os.fspath(out), name, arrays, placed, looks, material_key, settings, progress)
+
+
+def bake_file(
+    source: Path,
+    out: Path,
+    *,
+    mesh: int = -1,
+    finest_grid: int = 512,
+    coarsest_grid: int = 8,
+    rays_per_voxel: int = 200,
+    source_only: bool = False,
+    threads: int = 0,
+    memory_limit: int = 0,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """bake() for a file: OBJ with MTL, PLY, glTF or glb, gzipped or not. mesh: of glTF this one alone, in its own space;
+    -1 is the whole scene."""
+    settings = _settings(finest_grid, coarsest_grid, rays_per_voxel, source_only, threads, memory_limit)
+    return _farfield.bake_file(os.fspath(source), os.fspath(out), mesh, settings, progress)
+
+
+def _settings(
+    finest_grid: int, coarsest_grid: int, rays_per_voxel: int, source_only: bool, threads: int, memory_limit: int
+) -> dict[str, Any]:
+    for name, value in (("finest_grid", finest_grid), ("coarsest_grid", coarsest_grid),
+                        ("rays_per_voxel", rays_per_voxel), ("threads", threads), ("memory_limit", memory_limit)):
+        if value < 0:
+            raise ValueError(f"{name} is {value}")
+    return {
+        "finest_grid": finest_grid,
+        "coarsest_grid": coarsest_grid,
+        "rays_per_voxel": rays_per_voxel,
+        "source_only": source_only,
+        "threads": threads,
+        "memory_limit_bytes": memory_limit,
+    }
+
+
+class Asset:
+    """A baked asset: its folder, and what its manifest says. The functions of this module take it in place of a folder.
+
+    materials: the function that it was baked with, if it was; render() asks it up close.
+    """
+
+    def __init__(self, folder: Path, materials: MaterialFunction | None = None):
+        self.folder = os.fspath(folder)
+        self.materials = materials
+        self._info = info(self.folder)
+
+    @property
+    def levels(self) -> list[dict[str, Any]]:
+        """The stored levels, finest first."""
+        return self._info["levels"]
+
+    def info(self) -> dict[str, Any]:
+        return self._info
+
+    def evaluate(self, **options: Any) -> dict[str, Any]:
+        return evaluate(self, **options)
+
+    def render(self, **options: Any) -> npt.NDArray[np.float32]:
+        return render(self, **options)
+
+    def __fspath__(self) -> str:
+        return self.folder
+
+    def __repr__(self) -> str:
+        return f"farfield.Asset({self.folder!r})"
+
+
+def open(folder: Path, materials: MaterialFunction | None = None) -> Asset:
+    """Opens a baked asset."""
+    return Asset(folder, materials)
+
+
+def info(folder: Path) -> dict[str, Any]:
+    """What `farfield info --json` says: the asset's levels, with what they hold, cost and (once evaluated) miss."""
+    return json.loads(_farfield.info(os.fspath(folder)))
+
+
+def evaluate(
+    asset: Path,
+    *,
+    source: Path | None = None,
+    levels: tuple[int, int] = (1, 1000),
+    views: int = 12,
+    samples: int = 0,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """How far levels look from the source (docs/error_metric.md): {"views", "warnings", "levels": [{"level",
+    "occlusion_error", "occlusion_rms", "color_error", "color_bias", ...}]}; errors are fractions. The asset keeps them.
+
+    source: the file that was baked; without it the asset's own level 0. levels: from, to. samples: per pixel; 0: as
+    many as each level's size asks for.
+    """
+    options = {"first_level": levels[0], "last_level": levels[1], "views": views, "samples": samples, "seed": seed}
+    text = _farfield.evaluate(os.fspath(asset), "" if source is None else os.fspath(source), options, progress)
+    return json.loads(text)
+
+
+def render(
+    scene: Path | Sequence[tuple[Path, npt.ArrayLike]],
+    *,
+    width: int = 480,
+    height: int = 270,
+    eye: Sequence[float] | None = None,
+    target: Sequence[float] | None = None,
+    up: Sequence[float] = (0, 1, 0),
+    fov_y: float = 0.7,
+    samples: int = 16,
+    level: float | None = None,
+    light: Any = None,
+    channels: Sequence[str] = ("R", "G", "B"),
+    transparent: bool = False,
+    max_depth: int = 64,
+    seed: int = 0,
+    lod_scale: float = 1.0,
+    budget: int = 4 << 30,
+    threads: int = 0,
+    progress: Progress | None = None,
+) -> npt.NDArray[np.float32]:
+    """A path-traced picture of shape (height, width, channels), linear, row by row from the top.
+
+    scene: an asset, or (asset, 4 x 4 or 3 x 4 matrix to world) for each instance. eye, target, up: the camera; without
+    an eye all is seen. fov_y: vertical, radians. level: what every ray sees, 0 is the source; None: as its footprint
+    asks. light: None is sun and sky (+y up), (r, g, b) the same from everywhere, an array (height, width, 3) or the
+    name of an EXR a latitude-longitude picture. channels: also "A", "Z", "albedo.R", "N.X", "lod.level" and so on.
+    transparent: the light itself is not seen. budget: bytes for the assets. The same arguments give the same picture.
+    """
+    placed = [(scene, np.eye(4))] if isinstance(scene, (str, os.PathLike)) else list(scene)
+    arrays = [
+        (os.fspath(asset), _arrays.matrix(to_world, f"instance {i}"), _wrapped(getattr(asset, "materials", None)))
+        for i, (asset, to_world) in enumerate(placed)
+    ]
+    if not arrays:
+        raise ValueError("there is nothing to render")
+    if not (0 < width <= 1 << 15 and 0 < height <= 1 << 15):
+        raise ValueError(f"pictures of {width} x {height} pixels: 1 to {1 << 15} each way")
+    if not 0 < fov_y < np.pi:
+        raise ValueError(f"fov_y is {fov_y}; it is an angle in radians between 0 and pi")
+    view = {"width": width, "height": height, "eye": eye, "target": target, "up": up, "fov_y": fov_y,
+            "samples": samples, "seed": seed, "max_depth": max_depth, "transparent": transparent,
+            "budget_bytes": budget, "lod_scale": lod_scale, "level": level, "threads": threads}
+    look = os.fspath(light) if isinstance(light, os.PathLike) else light
+    return _farfield.render(arrays, view, list(channels), look, progress, _warn)
+
+
+def _wrapped(function: MaterialFunction | None) -> MaterialFunction | None:
+    return None if function is None else lambda query: function(query)
+
+
+def _warn(text: str) -> None:
+    _warnings.warn(text, stacklevel=3)

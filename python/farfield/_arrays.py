@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Brings what people have in arrays into the one shape that the extension takes."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Sequence
+
+import numpy as np
+
+_SRGB = np.arange(256) / 255.0
+_SRGB_TO_LINEAR = np.where(_SRGB <= 0.04045, _SRGB / 12.92, ((_SRGB + 0.055) / 1.055) ** 2.4).astype(np.float32)
+_COLOR_TEXTURES = ("base_color_texture", "emission_texture")
+
+
+def rows(values: Any, columns: int, what: str) -> np.ndarray:
+    """(n, columns) float64."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise ValueError(f"{what}: an array of shape (n, {columns}), not {array.shape}")
+    return np.ascontiguousarray(array)
+
+
+def integers(values: Any, what: str) -> np.ndarray:
+    """Whole numbers of any shape as int64; 1.0 is one, 1.5 is refused."""
+    array = np.asarray(values)
+    if array.size == 0:
+        return array.astype(np.int64)
+    if array.dtype.kind not in "iu" or array.dtype == np.uint64 and array.max() > np.iinfo(np.int64).max:
+        raise ValueError(f"{what}: an array of integers, not of {array.dtype}")
+    return np.ascontiguousarray(array, dtype=np.int64)
+
+
+def faces(values: Any, counts: Any) -> tuple[np.ndarray, np.ndarray | None]:
+    """Corners, face after face, and how many each face has (None: three)."""
+    if counts is not None:
+        return integers(values, "faces").ravel(), integers(counts, "counts").ravel()
+    if not isinstance(values, np.ndarray):
+        lengths = [len(face) for face in values]
+        if len(set(lengths)) > 1:  # polygons of several kinds
+            corners = np.concatenate([integers(face, "faces") for face in values])
+            return corners, np.asarray(lengths, dtype=np.int64)
+    array = integers(values, "faces")
+    if array.size == 0:
+        return array.ravel(), None
+    if array.ndim != 2:
+        raise ValueError(f"faces: an array of shape (n, corners of a face), or flat with counts; not {array.shape}")
+    if array.shape[1] == 3:
+        return array.ravel(), None
+    return array.ravel(), np.full(len(array), array.shape[1], dtype=np.int64)
+
+
+def attribute(values: Any, columns: int, points: int, corners: np.ndarray, what: str) -> tuple[np.ndarray, bool] | None:
+    """(float32 rows, whether they belong to points and not to corners). Three axes are corners: (n, k, columns)."""
+    if values is None:
+        return None
+    array = np.asarray(values, dtype=np.float32)
+    if columns == 4 and array.ndim >= 2 and array.shape[-1] == 3:
+        array = np.concatenate([array, np.ones_like(array[..., :1])], axis=-1)
+    if array.ndim not in (2, 3) or array.shape[-1] != columns:
+        raise ValueError(f"{what}: one row of {columns} numbers per point or per corner, not shape {array.shape}")
+    per_corner = array.ndim == 3
+    array = np.ascontiguousarray(array.reshape(-1, columns))
+    is_both = points == len(corners) == len(array) and not np.array_equal(corners, np.arange(points))
+    if not per_corner and is_both:
+        raise ValueError(
+            f"{what}: there are as many points as corners, so rows could be for either; give rows of corners as an "
+            f"array of shape (faces, corners of a face, {columns}), such as {what}[faces] for rows of points"
+        )
+    if per_corner or len(array) == len(corners):
+        return array, False
+    if len(array) == points:
+        return array, True
+    raise ValueError(f"{what}: {len(array)} rows for {points} points and {len(corners)} corners")
+
+
+def matrix(values: Any, what: str) -> np.ndarray:
+    """The upper 3 x 4 part of a transform, for column vectors: the last column is the translation."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape not in ((4, 4), (3, 4)):
+        raise ValueError(f"{what}: a matrix of shape (4, 4) or (3, 4), not {array.shape}")
+    if array.shape == (4, 4) and not np.array_equal(array[3], (0, 0, 0, 1)):
+        raise ValueError(f"{what}: the last row is {array[3].tolist()}, not 0 0 0 1; is the matrix transposed?")
+    return np.ascontiguousarray(array[:3])
+
+
+def image(values: Any, is_color: bool, what: str) -> str | np.ndarray:
+    """The name of a file, or (height, width, 4) float32. Colours of 8 bits are sRGB, as in image files."""
+    if isinstance(values, (str, os.PathLike)):
+        return os.fspath(values)
+    array = np.asarray(values)
+    if array.ndim == 2:
+        array = np.repeat(array[..., np.newaxis], 3, axis=-1)
+    if array.ndim != 3 or array.shape[-1] not in (3, 4):
+        raise ValueError(f"{what}: the name of a file or an array of shape (height, width, 3 or 4), not {array.shape}")
+    out = np.ones(array.shape[:2] + (4,), dtype=np.float32)
+    if array.dtype == np.uint8:
+        rgb = array[..., :3]
+        out[..., :3] = _SRGB_TO_LINEAR[rgb] if is_color else rgb / np.float32(255)
+        if array.shape[-1] == 4:
+            out[..., 3] = array[..., 3] / np.float32(255)
+    elif array.dtype.kind == "f":
+        out[..., : array.shape[-1]] = array
+    else:
+        raise ValueError(f"{what}: pixels are uint8 or floats, not {array.dtype}")
+    return out
+
+
+def material(fields: dict[str, Any]) -> dict[str, Any]:
+    out = dict(fields)
+    for name, value in fields.items():
+        if name == "alpha_texture" and not isinstance(value, (str, os.PathLike)):
+            # An array without alpha is a mask itself, as a file without alpha is.
+            array = np.asarray(value)
+            if array.ndim == 2:
+                value = np.repeat(array[..., np.newaxis], 4, axis=-1)
+            elif array.ndim == 3 and array.shape[-1] == 3:
+                value = np.repeat(array[..., :1], 4, axis=-1)
+        if name.endswith("_texture"):
+            out[name] = image(value, name in _COLOR_TEXTURES, name)
+    return out
+
+
+def materials(values: Any) -> list[dict[str, Any]] | Any:
+    """A function as it is; an (n, 3) array as base colours; dictionaries with their images brought into shape."""
+    if values is None:
+        return []
+    if callable(values):
+        return lambda query: values(query)  # of one kind, whatever is callable
+    if isinstance(values, np.ndarray):
+        return [{"base_color": tuple(map(float, color))} for color in rows(values, 3, "materials")]
+    if isinstance(values, dict):
+        raise ValueError("materials: a sequence of dictionaries, one per material id; put the dictionary into a list")
+    return [material(fields) for fields in values]
+
+
+def instances(values: Sequence[tuple[int, Any]] | None, mesh_count: int) -> list[tuple[int, np.ndarray]]:
+    out = []
+    for i, (mesh, to_asset) in enumerate(values or []):
+        if not 0 <= mesh < mesh_count:
+            raise ValueError(f"instance {i}: there is no mesh {mesh}; there are {mesh_count}")
+        out.append((int(mesh), matrix(to_asset, f"instance {i}")))
+    return out

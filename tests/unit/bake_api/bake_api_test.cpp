@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+// farfield/bake.h as a host calls it.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <map>
+
+#include "farfield/bake.h"
+#include "tests/support/files.h"
+#include "tests/support/png_files.h"
+
+namespace farfield {
+namespace {
+
+namespace fs = std::filesystem;
+using glm::vec2, glm::vec3, glm::vec4;
+
+/// A sphere of quads under a cloud of leaf cards: surface that stays and surface that becomes volume.
+struct Tree {
+  std::vector<vec3> points;
+  std::vector<uint32_t> corners, counts, materials;
+  std::vector<vec2> uv;
+
+  Tree() {
+    constexpr int kSides = 24;
+    const auto ball = [](int i, int j) {
+      const float phi = 6.2831853f * static_cast<float>(i % kSides) / kSides;
+      const float theta = 3.1415927f * static_cast<float>(j) / kSides;
+      return vec3(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi));
+    };
+    for (int i = 0; i < kSides; ++i)
+      for (int j = 1; j < kSides - 1; ++j) add({ball(i, j), ball(i + 1, j), ball(i + 1, j + 1), ball(i, j + 1)}, 0);
+    for (int i = 0; i < 400; ++i) {
+      const float turn = 2.4f * static_cast<float>(i);
+      const vec3 at(1.5f * std::cos(turn), 1.2f + 0.002f * static_cast<float>(i), 1.5f * std::sin(turn));
+      const vec3 side = 0.04f * vec3(std::cos(3 * turn), std::sin(5 * turn), std::sin(turn));
+      add({at, at + side, at + side + vec3(0, 0.05f, 0), at + vec3(0, 0.05f, 0)}, 1);
+    }
+  }
+
+  void add(const std::vector<vec3>& polygon, uint32_t material) {
+    for (size_t i = 0; i < polygon.size(); ++i) {
+      corners.push_back(static_cast<uint32_t>(points.size()));
+      points.push_back(polygon[i]);
+      uv.emplace_back(i == 1 || i == 2, i >= 2);
+    }
+    counts.push_back(static_cast<uint32_t>(polygon.size()));
+    materials.push_back(material);
+  }
+
+  BakeInput input() const {
+    BakeInput input;
+    input.name = "tree.obj";
+    BakeMesh& mesh = input.meshes.emplace_back();
+    mesh.points = points;
+    mesh.corners = corners;
+    mesh.counts = counts;
+    mesh.materials = materials;
+    mesh.uv = {uv, BakePer::Corner};
+    input.materials.resize(2);
+    input.materials[0].base_color = {0.5f, 0.25f, 0.125f};
+    input.materials[1].base_color = {1, 1, 1};
+    return input;
+  }
+
+  /// The same as a file, with digits enough for every float.
+  void write_obj(const test::TemporaryFolder& folder) const {
+    std::string text = "mtllib tree.mtl\n";
+    for (const vec3& p : points) text += fmt::format("v {:.9g} {:.9g} {:.9g}\n", p.x, p.y, p.z);
+    for (const vec2& t : uv) text += fmt::format("vt {:.9g} {:.9g}\n", t.x, 1 - t.y);  // v up
+    size_t corner = 0;
+    for (size_t face = 0; face < counts.size(); ++face) {
+      text += materials[face] == 0 ? "usemtl bark\nf" : "usemtl leaf\nf";
+      for (uint32_t i = 0; i < counts[face]; ++i, ++corner) {
+        text += fmt::format(" {}/{}", corners[corner] + 1, corner + 1);
+      }
+      text += "\n";
+    }
+    folder.write("tree.obj", text);
+    folder.write("tree.mtl", "newmtl bark\nKd 0.5 0.25 0.125\nnewmtl leaf\nKd 1 1 1\nmap_Kd leaf.png\n");
+    folder.write("leaf.png", leaf_png());
+  }
+  // sRGB and linear agree at 0 and 255.
+  static std::string leaf_png() { return test::png(2, 1, {{0, 255, 0, 255}, {255, 255, 0, 255}}); }
+};
+
+BakeSettings small_settings() {
+  BakeSettings settings;
+  settings.finest_grid = 32;
+  settings.coarsest_grid = 8;
+  settings.rays_per_voxel = 20;
+  return settings;
+}
+
+/// The level files of an asset by name.
+std::map<std::string, std::vector<std::byte>> level_bytes(const fs::path& asset) {
+  std::map<std::string, std::vector<std::byte>> bytes;
+  for (const auto& entry : fs::directory_iterator(asset)) {
+    if (entry.path().extension() == ".ffl") bytes[entry.path().filename()] = test::read_bytes(entry.path());
+  }
+  return bytes;
+}
+
+class BakeApi : public testing::Test {
+ protected:
+  std::string out(const std::string& name = "tree") const { return folder_.path() / (name + ".farfield"); }
+
+  const test::TemporaryFolder folder_;
+  const Tree tree_;
+};
+
+TEST_F(BakeApi, ArraysBakeToTheSameBytesAsTheFileThatHoldsThem) {
+  tree_.write_obj(folder_);
+  const auto of_file = bake_file(folder_.path() / "tree.obj", out("file"), small_settings());
+  ASSERT_TRUE(of_file) << of_file.error().message;
+  EXPECT_TRUE(of_file->warnings.empty()) << of_file->warnings[0];
+  ASSERT_GT(of_file->levels.size(), 1u);
+
+  BakeInput input = tree_.input();
+  const std::vector<vec4> pixels = {{0, 1, 0, 1}, {1, 1, 0, 1}};
+  input.materials[1].base_color_texture.pixels = pixels;
+  input.materials[1].base_color_texture.width = 2;
+  input.materials[1].base_color_texture.height = 1;
+  input.materials[0].name = "bark";
+  input.materials[1].name = "leaf";
+  const auto of_memory = bake_meshes(input, out("memory"), small_settings());
+  ASSERT_TRUE(of_memory) << of_memory.error().message;
+  EXPECT_EQ(level_bytes(out("file")), level_bytes(out("memory")));
+  EXPECT_EQ(of_memory->levels.size(), of_file->levels.size());
+  EXPECT_EQ(of_memory->levels[0].triangles, 2 * tree_.counts.size());
+  EXPECT_EQ(of_memory->levels[0].file_bytes, fs::file_size(fs::path(out("memory")) / "level_0.ffl"));
+}
+
+TEST_F(BakeApi, InstancesBakeLikeTheMeshesThatTheyShow) {
+  BakeInput once = tree_.input(), shown = tree_.input();
+  glm::dmat4x3 away(1.0);
+  away[3] = {4, 0, 0};
+  shown.instances = {{0, glm::dmat4x3(1.0)}, {0, away}};
+  std::vector<vec3> moved = tree_.points;
+  for (vec3& point : moved) point += vec3(4, 0, 0);
+  once.meshes.push_back(once.meshes[0]);
+  once.meshes[1].points = moved;
+  ASSERT_TRUE(bake_meshes(once, out("once"), small_settings()));
+  ASSERT_TRUE(bake_meshes(shown, out("shown"), small_settings()));
+  const auto of_once = level_bytes(out("once")), of_shown = level_bytes(out("shown"));
+  ASSERT_EQ(of_once.size(), of_shown.size());
+  // The sums differ by a rounding, so the bytes may; what there is does not.
+  for (const auto& [name, bytes] : of_once) EXPECT_EQ(bytes.size(), of_shown.at(name).size()) << name;
+}
+
+TEST_F(BakeApi, KnowsWhatItHasBakedAlready) {
+  BakeInput input = tree_.input();
+  EXPECT_FALSE(bake_meshes(input, out(), small_settings()).value().is_up_to_date);
+  EXPECT_TRUE(bake_meshes(input, out(), small_settings()).value().is_up_to_date);
+  input.materials[0].base_color.x = 0.25f;
+  EXPECT_FALSE(bake_meshes(input, out(), small_settings()).value().is_up_to_date);
+}
+
+TEST_F(BakeApi, AFunctionIsBakedAnewUnlessAKeyStandsForIt) {
+  BakeInput input = tree_.input();
+  input.material_function = [](const MaterialQuery&) { return MaterialSample{}; };
+  EXPECT_FALSE(bake_meshes(input, out(), small_settings()).value().is_up_to_date);
+  EXPECT_FALSE(bake_meshes(input, out(), small_settings()).value().is_up_to_date);
+  input.material_key = "grey, 1";
+  EXPECT_FALSE(bake_meshes(input, out(), small_settings()).value().is_up_to_date);
+  EXPECT_TRUE(bake_meshes(input, out(), small_settings()).value().is_up_to_date);
+}
+
+TEST_F(BakeApi, AFunctionThatSaysWhatDescriptionsSayBakesToTheSameLevels) {
+  BakeInput described = tree_.input(), asked = tree_.input();
+  asked.materials.clear();
+  asked.material_function = [colors = described.materials](const MaterialQuery& query) {
+    MaterialSample sample;
+    sample.diffuse = colors[query.material].base_color;
+    return sample;
+  };
+  ASSERT_TRUE(bake_meshes(described, out("described"), small_settings()));
+  ASSERT_TRUE(bake_meshes(asked, out("asked"), small_settings()));
+  auto of_described = level_bytes(out("described")), of_asked = level_bytes(out("asked"));
+  // Level 0 keeps where its faces come from only if somebody can be asked.
+  of_described.erase("level_0.ffl");
+  of_asked.erase("level_0.ffl");
+  ASSERT_FALSE(of_described.empty());
+  EXPECT_EQ(of_described, of_asked);
+}
+
+TEST_F(BakeApi, TellsHowFarItIs) {
+  BakeSettings settings = small_settings();
+  std::vector<double> done;
+  std::vector<std::string> stages;
+  settings.progress = [&](double part, const std::string& stage) {
+    done.push_back(part);
+    stages.push_back(stage);
+  };
+  ASSERT_TRUE(bake_meshes(tree_.input(), out(), settings));
+  ASSERT_GT(done.size(), 5u);
+  EXPECT_EQ(done.front(), 0.0);
+  EXPECT_EQ(done.back(), 1.0);
+  EXPECT_EQ(stages.front(), "import");
+  EXPECT_NE(std::find(stages.begin(), stages.end(), "level 1: voxelise"), stages.end());
+}
+
+TEST_F(BakeApi, StopsWhenTold) {
+  std::atomic<bool> cancel{false};
+  BakeSettings settings = small_settings();
+  settings.cancel = &cancel;
+  settings.progress = [&](double, const std::string& stage) { cancel = cancel || stage == "level 1: voxelise"; };
+  const auto baked = bake_meshes(tree_.input(), out(), settings);
+  ASSERT_FALSE(baked);
+  EXPECT_EQ(baked.error().code, ErrorCode::Cancelled);
+  EXPECT_FALSE(fs::exists(out()));
+}
+
+TEST_F(BakeApi, KeepsToTheMemoryThatItMayTake) {
+  BakeSettings settings = small_settings();
+  settings.finest_grid = 512;
+  settings.memory_limit_bytes = 1;
+  const auto baked = bake_meshes(tree_.input(), out(), settings);
+  ASSERT_FALSE(baked);
+  EXPECT_EQ(baked.error().code, ErrorCode::OutOfBudget) << baked.error().message;
+  EXPECT_FALSE(fs::exists(out()));
+  settings = small_settings();
+  settings.memory_limit_bytes = uint64_t{1} << 34;
+  EXPECT_TRUE(bake_meshes(tree_.input(), out(), settings));
+}
+
+TEST_F(BakeApi, RefusesWhatItCannotDo) {
+  const auto code_with = [&](auto spoil) {
+    BakeSettings settings = small_settings();
+    BakeInput input = tree_.input();
+    spoil(settings, input);
+    const auto baked = bake_meshes(input, out(), settings);
+    EXPECT_FALSE(baked);
+    EXPECT_FALSE(fs::exists(out()));
+    return baked ? ErrorCode::Cancelled : baked.error().code;
+  };
+  EXPECT_EQ(code_with([](BakeSettings& s, BakeInput&) { s.finest_grid = 100; }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(code_with([](BakeSettings& s, BakeInput&) { s.threads = -1; }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(code_with([](BakeSettings&, BakeInput& i) { i.meshes.clear(); }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(code_with([](BakeSettings&, BakeInput& i) { i.materials.pop_back(); }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(bake_file(folder_.path() / "none.obj", out()).error().code, ErrorCode::NotFound);
+}
+
+}  // namespace
+}  // namespace farfield
