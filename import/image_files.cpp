@@ -35,19 +35,33 @@ Result<std::vector<unsigned char>> ImageFiles::read_noted(const fs::path& path) 
   return bytes;
 }
 
+namespace {
+
+/// The file of a folder that has this name in upper or lower case; the first of several, so that it is the same one
+/// everywhere. Empty if there is none.
+fs::path in_other_letters(const fs::path& folder, const fs::path& name) {
+  const std::string wanted = lower_case(name.string());
+  std::set<fs::path> fitting;
+  std::error_code error;
+  fs::directory_iterator entry(folder.empty() ? fs::path(".") : folder, error);
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    const fs::path other = entry->path().filename();
+    std::error_code unreadable;
+    if (other != name && lower_case(other.string()) == wanted && entry->is_regular_file(unreadable)) {
+      fitting.insert(other);
+    }
+  }
+  return fitting.empty() ? fs::path() : folder / *fitting.begin();
+}
+
+}  // namespace
+
 fs::path find_by_last_name(const fs::path& folder, const fs::path& named) {
   const fs::path exact = folder / named.filename();
-  if (exact != named && fs::is_regular_file(exact)) return exact;
-  const std::string wanted = lower_case(named.filename().string());
-  std::error_code error;
+  std::error_code too_long;  // or else
+  if (exact != named && fs::is_regular_file(exact, too_long)) return exact;
   for (const fs::path& place : {named.parent_path(), folder}) {
-    std::set<fs::path> fitting;  // in order, so that the same one is taken everywhere
-    for (const auto& entry : fs::directory_iterator(place, error)) {
-      if (lower_case(entry.path().filename().string()) == wanted && entry.is_regular_file(error)) {
-        fitting.insert(entry.path());
-      }
-    }
-    if (!fitting.empty() && *fitting.begin() != named) return *fitting.begin();
+    if (const fs::path found = in_other_letters(place, named.filename()); !found.empty()) return found;
   }
   return {};
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <system_error>
 
 #include "base/texture_module.h"
 #include "import/texture.h"
@@ -52,7 +53,8 @@ Result<Texture> decode_texture(std::span<const unsigned char> bytes, const std::
 
 Result<Texture> read_texture(const std::filesystem::path& path, TextureUse use) {
   const std::string name = path.string();
-  if (!std::filesystem::is_regular_file(path)) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
     return make_error(ErrorCode::NotFound, fmt::format("{}: no such image file", name));
   }
   const auto module = texture_module();

@@ -151,6 +151,14 @@ TEST(MtlTraits, TexturesByAbsolutePathsOfAnotherComputer) {
   }
 }
 
+TEST(MtlTraits, NamesThatNoFileSystemTakesAreMissing) {
+  const SourceMesh mesh = read_with_mtl(
+      "m", "ship.mtl", "newmtl m\nmap_Kd " + std::string(5000, 'x') + "/" + std::string(5000, 'y') + "\n");
+  EXPECT_FALSE(mesh.materials[0].base_color_map);
+  expect_said(mesh, "the plain colour is used");
+  expect_said(read_with_mtl("m", std::string(5000, 'x'), ""), "cannot be read");
+}
+
 TEST(MtlTraits, LineEndsOfOldMacs) {
   EXPECT_EQ(read_with_mtl("m", "ship.mtl", "newmtl m\rKd 1 0 0\r").materials[0].base_color, vec3(1, 0, 0));
 }
