@@ -75,7 +75,7 @@ TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
       {"--output", "--finest-grid", "--coarsest-grid", "--threads", "--report", "--mesh", "--source-only"},
       {"--json"},
       {},
-      {"--source", "--levels", "--views", "--spp", "--json", "--sheet", "--images"},
+      {"--source", "--other-source", "--levels", "--views", "--spp", "--json", "--sheet", "--images"},
       {"--frame", "--size", "--spp", "--budget", "--assets", "--blend", "--lod-scale", "--full-detail", "--output"},
       {"--frames", "--size", "--spp", "--budget", "--assets", "--blend", "--lod-scale", "--full-detail", "--output"},
       {"--output", "--width"}};
@@ -348,10 +348,21 @@ TEST_F(WholeRoad, EvaluateGivesTheSameFiguresForAnyNumberOfThreads) {
   EXPECT_EQ(levels[0], levels[1]);
 }
 
-TEST_F(WholeRoad, EvaluateWarnsWhenTheSourceIsAnother) {
+TEST_F(WholeRoad, EvaluateRefusesAnotherSourceUnlessToldTo) {
   test::write_bush_obj(path("other.obj"), 200);
-  const ProcessOutput output = farfield({"evaluate", asset, "--source", path("other.obj"), "--levels", "3", "--views",
-                                         "1", "--spp", "4", "--json", path("other.json")});
+  std::vector<std::string> evaluate = {"evaluate", asset, "--source", path("other.obj"),
+                                       "--levels", "3",   "--views",  "1",
+                                       "--spp",    "4",   "--json",   path("other.json")};
+  const ProcessOutput refused = farfield(evaluate);
+  expect_one_line_error(refused, "--other-source");
+  expect_one_line_error(refused, asset);
+  expect_one_line_error(refused, path("other.obj"));
+  EXPECT_FALSE(fs::exists(path("other.json")));
+
+  const std::string manifest = contents(asset + "/manifest.json");
+  evaluate.push_back("--other-source");
+  const ProcessOutput output = farfield(evaluate);
+  EXPECT_EQ(contents(asset + "/manifest.json"), manifest) << "errors against another source were recorded";
   EXPECT_EQ(output.exit_code, 0);
   EXPECT_EQ(output.out, "");
   EXPECT_NE(output.err.find("warning"), std::string::npos) << output.err;
