@@ -73,7 +73,7 @@ const std::vector<std::string> kCommands = {"bake", "info", "verify", "evaluate"
 TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
   const std::vector<std::vector<std::string>> flags = {
       {"--output", "--finest-grid", "--coarsest-grid", "--threads", "--report", "--mesh", "--source-only"},
-      {"--json"},
+      {"--json", "--mesh"},
       {},
       {"--source", "--other-source", "--levels", "--views", "--spp", "--json", "--sheet", "--images"},
       {"--frame", "--size", "--spp", "--budget", "--assets", "--blend", "--lod-scale", "--full-detail", "--output"},
@@ -166,6 +166,7 @@ TEST_F(BadInput, BrokenFilesAreNamed) {
   for (const char* name : {"broken.obj", "broken.ply", "broken.glb", "broken.gltf", "broken.obj.gz", "broken.txt"}) {
     write(path(name), noise);
     expect_one_line_error(farfield({"bake", path(name), "-o", path("out.farfield")}), name);
+    expect_one_line_error(farfield({"info", path(name)}), name);
   }
   expect_one_line_error(farfield({"render", path("broken.glb"), "-o", path("a.exr")}), "broken.glb");
   write(path("empty.obj"), "");
@@ -292,6 +293,36 @@ TEST_F(WholeRoad, InfoShowsEveryLevel) {
     EXPECT_GT(level["bytes_resident"], 0);
     EXPECT_GT(level["triangles"].get<int>() + level["voxels"].get<int>(), 0);
   }
+}
+
+TEST_F(WholeRoad, InfoOfASourceShowsItsMaterials) {
+  const ProcessOutput table = farfield({"info", bush});
+  EXPECT_EQ(table.exit_code, 0);
+  EXPECT_EQ(table.err, "");
+  EXPECT_NE(table.out.find("not baked"), std::string::npos) << table.out;
+  const Json info = Json::parse(farfield({"info", bush, "--json"}).out);
+  ASSERT_EQ(info["materials"].size(), 3u);  // bark and two greens
+  double share = 0;
+  for (const Json& material : info["materials"]) {
+    EXPECT_NE(table.out.find(material["name"].get<std::string>()), std::string::npos) << table.out;
+    EXPECT_EQ(material["looks_wrong"], Json::array());
+    share += material["area_share"].get<double>();
+  }
+  EXPECT_NEAR(share, 1, 1e-9);
+  expect_one_line_error(farfield({"info", asset, "--mesh", "0"}), "--mesh");
+}
+
+TEST_F(WholeRoad, InfoOfASourceMarksWhatLooksWrong) {
+  write(path("wrong.mtl"), "newmtl ink\nKd 0 0 0\nnewmtl bark\nKd 1 1 1\nmap_Kd bark.png\n");
+  write(path("wrong.obj"),
+        "mtllib wrong.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\n"
+        "usemtl ink\nf 1/1 2/2 3/3\nusemtl bark\nf 1/1 2/2 4/3\n");
+  const ProcessOutput table = farfield({"info", path("wrong.obj")});
+  EXPECT_EQ(table.exit_code, 0);
+  EXPECT_NE(table.out.find("looks wrong: ink: black\n"), std::string::npos) << table.out;
+  EXPECT_NE(table.out.find("looks wrong: bark: base colour map missing\n"), std::string::npos) << table.out;
+  EXPECT_NE(table.out.find("warning: "), std::string::npos) << table.out;
+  EXPECT_NE(table.err.find("bark.png"), std::string::npos) << table.err;
 }
 
 TEST_F(WholeRoad, VerifyAcceptsTheAssetAndFindsABrokenByteInEveryLevel) {
