@@ -90,6 +90,15 @@ Result<Manifest> bake_source(const EvaluateOptions& options, const fs::path& fol
   return std::move(report.manifest);
 }
 
+/// Pictures of a wrong source would show its difference, not the levels': said before hours are spent on them.
+Error other_source_error(const EvaluateOptions& options) {
+  return {
+      ErrorCode::InvalidArgument,
+      fmt::format("{}: was not baked from {} as it is now (or from another --mesh of it); bake it again, or compare "
+                  "all the same with --other-source",
+                  options.asset.string(), options.source.string())};
+}
+
 Result<Parts> render_parts(const AssetView& asset, const OrthoView& view, int samples_per_pixel, uint64_t seed,
                            const Lights& lights, const Job& job) {
   ViewOptions options;
@@ -258,12 +267,15 @@ Result<Evaluation> evaluate(const EvaluateOptions& options) {
   FARFIELD_TRY_LET(auto source_manifest,
                    has_source ? bake_source(options, source_folder) : read_manifest(options.asset));
 
+  const bool is_other = source_manifest.source_hash != manifest.source_hash;
+  if (is_other && !options.other_source) return tl::unexpected(other_source_error(options));
+
   FARFIELD_TRY_LET(auto plans,
                    plan_evaluation(manifest, in_source_space(source_manifest.bounds, source_manifest), options));
   FARFIELD_TRY_LET(auto source, AssetView::open(source_folder, 0.0f));
 
   FARFIELD_TRY_LET(auto evaluation, Evaluator(options, *source).run(plans));
-  if (source_manifest.source_hash != manifest.source_hash) {
+  if (is_other) {
     evaluation.warnings.push_back(
         fmt::format("{}: was baked from a file that differs from {}; the errors are not recorded in the asset",
                     options.asset.string(), options.source.string()));

@@ -19,6 +19,7 @@ struct EvaluateOptions {
   std::filesystem::path asset;   ///< baked folder
   std::filesystem::path source;  ///< the file it was baked from; imported anew. Empty: the asset's own level 0
   ImportOptions import;          ///< as given to the bake
+  bool other_source = false;     ///< compare with a source that the asset was not baked from, too; records nothing
   uint32_t first_level = 1;      ///< stored levels in [first_level, last_level] are evaluated
   uint32_t last_level = 0xffffffffu;
   int views = 12;             ///< >= 1
@@ -48,7 +49,8 @@ struct Evaluation {
 /// Renders every chosen level and the source from the same views, under the same light, at one pixel per voxel of the
 /// level, measures, writes pictures, and records the errors in the asset's manifest (if that fails: a warning). The
 /// result depends on the arguments alone, not on threads or time. Errors: those of read_manifest, bake, AssetView and
-/// image files; InvalidArgument (no such level, no views, pictures beyond 2^26 pixels); Cancelled.
+/// image files; InvalidArgument (no such level, no views, pictures beyond 2^26 pixels; before any picture: a source
+/// that the asset was not baked from, unless other_source is set); Cancelled.
 Result<Evaluation> evaluate(const EvaluateOptions& options);
 
 /// Samples per pixel that keep a level's cost bounded: many for the few pixels of coarse levels. pixels: over all

@@ -199,10 +199,12 @@ void MaterialLibraries::set_metallic_roughness_map(const Entry& entry, SourceMat
   if (!mtl.map_pr && !mtl.map_pm) return;
   const SourceTexture roughness = mtl.map_pr ? texture(entry, mtl.map_pr, TextureUse::Data) : SourceTexture{};
   const SourceTexture metallic = mtl.map_pm ? texture(entry, mtl.map_pm, TextureUse::Data) : SourceTexture{};
+  const bool is_missing = roughness.is_missing || metallic.is_missing;
+  out.metallic_roughness_map = roughness ? roughness : metallic;
+  out.metallic_roughness_map.is_missing = is_missing;
   if (!roughness && !metallic) return;
   if (metallic && out.metallic == 0) warn(fmt::format("material {}: Pm 0 switches map_Pm off", mtl.name));
   if (roughness && out.roughness == 0) warn(fmt::format("material {}: Pr 0 switches map_Pr off", mtl.name));
-  out.metallic_roughness_map = roughness ? roughness : metallic;
   out.metallic_roughness_map.image = std::make_shared<const Texture>(
       pack_metallic_roughness(roughness.image.get(), mtl.map_pr.channel, metallic.image.get(), mtl.map_pm.channel));
 }
@@ -251,6 +253,7 @@ SourceTexture MaterialLibraries::mask(const Entry& entry, const MtlMap& map) {
 SourceTexture MaterialLibraries::texture(const Entry& entry, const MtlMap& map, TextureUse use) {
   SourceTexture out;
   out.image = images_.read(entry.file.parent_path(), map.file, use);
+  out.is_missing = !out.image;
   if (map.is_clamped) out.wrap_u = out.wrap_v = Wrap::Clamp;
   return out;
 }

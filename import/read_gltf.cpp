@@ -269,6 +269,12 @@ class MaterialReader {
 
   /// Null, with a warning, when the image cannot be had: the factors then stand alone.
   SourceTexture texture(int index, TextureUse use) {
+    SourceTexture out = found_texture(index, use);
+    out.is_missing = !out;
+    return out;
+  }
+
+  SourceTexture found_texture(int index, TextureUse use) {
     const auto& source = document_.model.textures[static_cast<size_t>(index)];
     SourceTexture out;
     if (source.sampler >= 0) {

@@ -362,6 +362,7 @@ class PlyReader {
       SourceMaterial& material = mesh_.materials.emplace_back();
       material.name = file;
       material.base_color_map.image = images.read(folder_, file, TextureUse::Color);
+      material.base_color_map.is_missing = !material.base_color_map;
       if (material.base_color_map) material.base_color = vec3(1.0f);
     }
     FARFIELD_TRY(images.ready());

@@ -21,6 +21,7 @@ namespace farfield {
 struct SourceTexture {
   std::shared_ptr<const Texture> image;  ///< null: no texture
   Wrap wrap_u = Wrap::Repeat, wrap_v = Wrap::Repeat;
+  bool is_missing = false;  ///< the source names a texture, but it could not be read: a warning says why
 
   explicit operator bool() const { return image != nullptr; }
 };

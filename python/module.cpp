@@ -41,6 +41,7 @@ std::string evaluate_asset(const std::string& folder, const std::string& source,
   EvaluateOptions options;
   options.asset = folder;
   options.source = source;
+  options.other_source = fields["other_source"].cast<bool>();
   options.first_level = fields["first_level"].cast<uint32_t>();
   options.last_level = fields["last_level"].cast<uint32_t>();
   options.views = fields["views"].cast<int>();

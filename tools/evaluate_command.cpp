@@ -78,6 +78,8 @@ void add_evaluate_command(CLI::App& app, Action& action) {
       ->check(is_named);
   command->add_option("--source", arguments->source, "The model it was baked from")->required()->check(is_named);
   command->add_option("--mesh", options.import.mesh, "glTF: the mesh that was baked")->check(CLI::Range(0, 1 << 20));
+  command->add_flag("--other-source", options.other_source,
+                    "Compare with a model that it was not baked from, too; then no errors are kept");
   add_parsed_option(command, "--levels", arguments->levels, parse_level_range,
                     "Levels A-B; without it all but the source");
   command->add_option("--views", options.views, "Pictures per level")

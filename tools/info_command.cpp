@@ -1,35 +1,71 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "base/result.h"
 #include "cache/manifest.h"
+#include "evaluate/source_summary.h"
 #include "tools/commands.h"
+#include "tools/console.h"
 #include "tools/flags.h"
 #include "tools/info_text.h"
+#include "tools/interrupt.h"
+#include "tools/progress.h"
+#include "tools/source_text.h"
 
 namespace farfield::tool {
 namespace {
 
-Result<void> run_info(const std::string& asset, bool as_json) {
-  FARFIELD_TRY_LET(const auto manifest, read_manifest(asset));
-  fmt::print("{}", as_json ? info_json(asset, manifest) : info_table(asset, manifest));
+struct InfoArguments {
+  std::string path;
+  ImportOptions import;
+  bool as_json = false;
+};
+
+Result<void> info_of_asset(const InfoArguments& arguments) {
+  if (arguments.import.mesh >= 0)
+    return make_error(ErrorCode::InvalidArgument,
+                      fmt::format("{}: --mesh chooses from a glTF source, this is a folder", arguments.path));
+  FARFIELD_TRY_LET(const auto manifest, read_manifest(arguments.path));
+  fmt::print("{}", arguments.as_json ? info_json(arguments.path, manifest) : info_table(arguments.path, manifest));
   return {};
+}
+
+Result<void> info_of_source(const InfoArguments& arguments) {
+  ProgressLine progress;
+  const Job job{[&](double done, const std::string& stage) { progress.update(done, stage); }, &catch_interrupts()};
+  const auto summary = summarise_source(arguments.path, arguments.import, job);
+  progress.clear();
+  if (!summary) return tl::unexpected(summary.error());
+  // The table ends with all warnings: who reads it on a terminal need not read them twice.
+  if (arguments.as_json || !stdout_is_terminal()) print_warnings("info", summary->warnings);
+  fmt::print("{}", arguments.as_json ? source_json(arguments.path, *summary) : source_table(arguments.path, *summary));
+  return {};
+}
+
+/// What is baked is a folder; a file is what one bakes from.
+Result<void> run_info(const InfoArguments& arguments) {
+  std::error_code ignored;  // what cannot be looked at is refused with the file's name by info_of_asset()
+  return std::filesystem::is_regular_file(arguments.path, ignored) ? info_of_source(arguments)
+                                                                   : info_of_asset(arguments);
 }
 
 }  // namespace
 
 void add_info_command(CLI::App& app, Action& action) {
-  struct Arguments {
-    std::string asset;
-    bool as_json = false;
-  };
-  auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("info", "Show the levels of a baked asset: what they hold, cost and miss");
-  command->add_option("asset", arguments->asset, "Baked folder")->required();
+  auto arguments = std::make_shared<InfoArguments>();
+  CLI::App* command = app.add_subcommand(
+      "info",
+      "Show what the levels of a baked asset hold, cost and miss, or what is understood of a model before a bake");
+  command->add_option("path", arguments->path, "Baked folder, or a model: OBJ, PLY, glTF or glb, gzipped or not")
+      ->required()
+      ->check(is_named);
+  command->add_option("--mesh", arguments->import.mesh, "glTF model: only this mesh, as for bake")
+      ->check(CLI::Range(0, 1 << 20));
   command->add_flag("--json", arguments->as_json, "Print JSON");
-  command->footer("Example:\n  farfield info oak.farfield");
-  command->callback(
-      [arguments, &action] { action = [arguments] { return run_info(arguments->asset, arguments->as_json); }; });
+  command->footer("Example:\n  farfield info oak.farfield\n  farfield info oak.obj.gz");
+  command->callback([arguments, &action] { action = [arguments] { return run_info(*arguments); }; });
 }
 
 }  // namespace farfield::tool

@@ -201,6 +201,7 @@ def evaluate(
     asset: Path,
     *,
     source: Path | None = None,
+    other_source: bool = False,
     levels: tuple[int, int] = (1, 1000),
     views: int = 12,
     samples: int = 0,
@@ -210,10 +211,18 @@ def evaluate(
     """How far levels look from the source (docs/error_metric.md): {"views", "warnings", "levels": [{"level",
     "occlusion_error", "occlusion_rms", "color_error", "color_bias", ...}]}; errors are fractions. The asset keeps them.
 
-    source: the file that was baked; without it the asset's own level 0. levels: from, to. samples: per pixel; 0: as
+    source: the file that was baked; without it the asset's own level 0. other_source: compare with a file that was not
+    baked, too (then the asset keeps nothing; without it that is an Error). levels: from, to. samples: per pixel; 0: as
     many as each level's size asks for.
     """
-    options = {"first_level": levels[0], "last_level": levels[1], "views": views, "samples": samples, "seed": seed}
+    options = {
+        "other_source": other_source,
+        "first_level": levels[0],
+        "last_level": levels[1],
+        "views": views,
+        "samples": samples,
+        "seed": seed,
+    }
     text = _farfield.evaluate(os.fspath(asset), "" if source is None else os.fspath(source), options, progress)
     figures: dict[str, Any] = json.loads(text)
     return figures

@@ -73,9 +73,9 @@ const std::vector<std::string> kCommands = {"bake", "info", "verify", "evaluate"
 TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
   const std::vector<std::vector<std::string>> flags = {
       {"--output", "--finest-grid", "--coarsest-grid", "--threads", "--report", "--mesh", "--source-only"},
-      {"--json"},
+      {"--json", "--mesh"},
       {},
-      {"--source", "--levels", "--views", "--spp", "--json", "--sheet", "--images"},
+      {"--source", "--other-source", "--levels", "--views", "--spp", "--json", "--sheet", "--images"},
       {"--frame", "--size", "--spp", "--budget", "--assets", "--blend", "--lod-scale", "--full-detail", "--output"},
       {"--frames", "--size", "--spp", "--budget", "--assets", "--blend", "--lod-scale", "--full-detail", "--output"},
       {"--output", "--width"}};
@@ -183,6 +183,7 @@ TEST_F(BadInput, BrokenFilesAreNamed) {
   for (const char* name : {"broken.obj", "broken.ply", "broken.glb", "broken.gltf", "broken.obj.gz", "broken.txt"}) {
     write(path(name), noise);
     expect_one_line_error(farfield({"bake", path(name), "-o", path("out.farfield")}), name);
+    expect_one_line_error(farfield({"info", path(name)}), name);
   }
   expect_one_line_error(farfield({"render", path("broken.glb"), "-o", path("a.exr")}), "broken.glb");
   write(path("empty.obj"), "");
@@ -311,6 +312,36 @@ TEST_F(WholeRoad, InfoShowsEveryLevel) {
   }
 }
 
+TEST_F(WholeRoad, InfoOfASourceShowsItsMaterials) {
+  const ProcessOutput table = farfield({"info", bush});
+  EXPECT_EQ(table.exit_code, 0);
+  EXPECT_EQ(table.err, "");
+  EXPECT_NE(table.out.find("not baked"), std::string::npos) << table.out;
+  const Json info = Json::parse(farfield({"info", bush, "--json"}).out);
+  ASSERT_EQ(info["materials"].size(), 3u);  // bark and two greens
+  double share = 0;
+  for (const Json& material : info["materials"]) {
+    EXPECT_NE(table.out.find(material["name"].get<std::string>()), std::string::npos) << table.out;
+    EXPECT_EQ(material["looks_wrong"], Json::array());
+    share += material["area_share"].get<double>();
+  }
+  EXPECT_NEAR(share, 1, 1e-9);
+  expect_one_line_error(farfield({"info", asset, "--mesh", "0"}), "--mesh");
+}
+
+TEST_F(WholeRoad, InfoOfASourceMarksWhatLooksWrong) {
+  write(path("wrong.mtl"), "newmtl ink\nKd 0 0 0\nnewmtl bark\nKd 1 1 1\nmap_Kd bark.png\n");
+  write(path("wrong.obj"),
+        "mtllib wrong.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\n"
+        "usemtl ink\nf 1/1 2/2 3/3\nusemtl bark\nf 1/1 2/2 4/3\n");
+  const ProcessOutput table = farfield({"info", path("wrong.obj")});
+  EXPECT_EQ(table.exit_code, 0);
+  EXPECT_NE(table.out.find("looks wrong: ink: black\n"), std::string::npos) << table.out;
+  EXPECT_NE(table.out.find("looks wrong: bark: base colour map missing\n"), std::string::npos) << table.out;
+  EXPECT_NE(table.out.find("warning: "), std::string::npos) << table.out;
+  EXPECT_NE(table.err.find("bark.png"), std::string::npos) << table.err;
+}
+
 TEST_F(WholeRoad, VerifyAcceptsTheAssetAndFindsABrokenByteInEveryLevel) {
   const ProcessOutput good = farfield({"verify", asset});
   EXPECT_EQ(good.exit_code, 0);
@@ -365,10 +396,21 @@ TEST_F(WholeRoad, EvaluateGivesTheSameFiguresForAnyNumberOfThreads) {
   EXPECT_EQ(levels[0], levels[1]);
 }
 
-TEST_F(WholeRoad, EvaluateWarnsWhenTheSourceIsAnother) {
+TEST_F(WholeRoad, EvaluateRefusesAnotherSourceUnlessToldTo) {
   test::write_bush_obj(path("other.obj"), 200);
-  const ProcessOutput output = farfield({"evaluate", asset, "--source", path("other.obj"), "--levels", "3", "--views",
-                                         "1", "--spp", "4", "--json", path("other.json")});
+  std::vector<std::string> evaluate = {"evaluate", asset, "--source", path("other.obj"),
+                                       "--levels", "3",   "--views",  "1",
+                                       "--spp",    "4",   "--json",   path("other.json")};
+  const ProcessOutput refused = farfield(evaluate);
+  expect_one_line_error(refused, "--other-source");
+  expect_one_line_error(refused, asset);
+  expect_one_line_error(refused, path("other.obj"));
+  EXPECT_FALSE(fs::exists(path("other.json")));
+
+  const std::string manifest = contents(asset + "/manifest.json");
+  evaluate.push_back("--other-source");
+  const ProcessOutput output = farfield(evaluate);
+  EXPECT_EQ(contents(asset + "/manifest.json"), manifest) << "errors against another source were recorded";
   EXPECT_EQ(output.exit_code, 0);
   EXPECT_EQ(output.out, "");
   EXPECT_NE(output.err.find("warning"), std::string::npos) << output.err;
