@@ -18,7 +18,7 @@ void* touch_block() {
   return block;
 }
 
-TEST(ResidentSet, GrowsAndShrinksWithWhatIsTouched) {
+TEST(ProcessMemory, GrowsAndShrinksWithWhatIsTouched) {
   const auto before = static_cast<double>(resident_set_bytes());
   ASSERT_GT(before, 0);
   void* block = touch_block();
