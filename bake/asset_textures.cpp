@@ -176,12 +176,13 @@ std::vector<double> texel_areas(const SourceSurface& source, const AssetLook& lo
   for (size_t m = 0; m < look.materials.size(); ++m) {
     if (!(uv_area[m] > 0)) continue;
     const AssetMaterial& material = look.materials[m];
-    for (const TextureRef* map : {&material.base_color_map, &material.metallic_roughness_map, &material.alpha_map,
-                                  &material.normal_map, &material.emission_map, &material.mask_map}) {
-      if (!*map) continue;
-      const AssetTexture& t = look.textures[map->texture];
-      texel[map->texture] = std::max(texel[map->texture], area[m] / uv_area[m] / (double(t.width) * t.height));
-    }
+    const auto note = [&](const TextureRef& map) {
+      if (!map) return;
+      const AssetTexture& t = look.textures[map.texture];
+      texel[map.texture] = std::max(texel[map.texture], area[m] / uv_area[m] / (double(t.width) * t.height));
+    };
+    for (const TextureRef* map : material.maps()) note(*map);
+    note(material.mask_map);
   }
   return texel;
 }

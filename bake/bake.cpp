@@ -239,7 +239,7 @@ class Baker {
     const Surface ordered = reorder(faces, source_order_);
     LevelData level = pack_level(0, report_.manifest.base_resolution, ordered, source_order_, {}, {});
     level.face_sggx = {};  // hits have the normals themselves
-    pack_source(source_, source_order_, level);
+    pack_source(source_, source_order_, ordered, level);
     auto done = store_level(level, level_report);
     level_report.write_seconds = watch.seconds();
     report_.levels.push_back(level_report);

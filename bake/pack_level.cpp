@@ -332,8 +332,8 @@ Surface reorder(const Surface& surface, const SurfaceOrder& order) {
     if (order.vertex_number[v] != kNoIndex) result.positions[order.vertex_number[v]] = surface.positions[v];
   }
   for (const Quad& quad : order.quads) {
-    result.triangles.push_back({quad.v0, quad.v1, quad.v3});
-    if (quad.is_pair()) result.triangles.push_back({quad.v2, quad.v3, quad.v1});
+    result.triangles.push_back(quad.face(0));
+    if (quad.is_pair()) result.triangles.push_back(quad.face(1));
   }
   result.materials.resize(surface.materials.size());
   for (size_t f = 0; f < surface.materials.size(); ++f) result.materials[order.face_number[f]] = surface.materials[f];

@@ -77,16 +77,6 @@ class CornerPacker {
   std::unordered_map<uint64_t, std::vector<uint32_t>> by_hash_;
 };
 
-/// The vertices of a level's faces, in their final rotation.
-std::vector<uvec3> faces_of(const LevelData& level) {
-  std::vector<uvec3> faces;
-  for (const Quad& quad : level.quads) {
-    faces.push_back({quad.v0, quad.v1, quad.v3});
-    if (quad.is_pair()) faces.push_back({quad.v2, quad.v3, quad.v1});
-  }
-  return faces;
-}
-
 /// Which of the triangle's corners the face starts with.
 uint32_t turn_of(const SourceSurface& source, const SurfaceOrder& order, uint32_t triangle, const uvec3& face) {
   for (uint32_t turn = 0; turn < 3; ++turn) {
@@ -98,10 +88,10 @@ uint32_t turn_of(const SourceSurface& source, const SurfaceOrder& order, uint32_
 
 }  // namespace
 
-void pack_source(const SourceSurface& source, const SurfaceOrder& order, LevelData& level) {
+void pack_source(const SourceSurface& source, const SurfaceOrder& order, const Surface& ordered, LevelData& level) {
   std::vector<uint32_t> triangle_of(source.triangles.size());  // per face
   for (uint32_t t = 0; t < triangle_of.size(); ++t) triangle_of[order.face_number[t]] = t;
-  const std::vector<uvec3> faces = faces_of(level);
+  const std::vector<uvec3>& faces = ordered.triangles;
   std::vector<uint32_t> turn(faces.size());
   for (size_t f = 0; f < faces.size(); ++f) turn[f] = turn_of(source, order, triangle_of[f], faces[f]);
 

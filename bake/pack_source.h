@@ -8,11 +8,11 @@
 
 namespace farfield {
 
-/// Adds to a packed level 0, whose surface is reorder(average_faces(source), order): materials and numbers of faces,
-/// and at their corners shading normals, texture coordinates and vertex colours. Each only where something depends on
-/// it: coordinates where there are textures or a host's function, colours where they vary inside faces or textures
-/// multiply them, numbers where there are coordinates, colours or several materials. `source.triangles[i]` has become
-/// the face order.face_number[i], its corners perhaps rotated.
-void pack_source(const SourceSurface& source, const SurfaceOrder& order, LevelData& level);
+/// Adds to a packed level 0 with the surface `ordered`, reorder(average_faces(source), order): materials and numbers of
+/// faces, and at their corners shading normals, texture coordinates and vertex colours. Each only where something
+/// depends on it: coordinates where there are textures or a host's function, colours where they vary inside faces or
+/// textures multiply them, numbers where there are coordinates, colours or several materials. `source.triangles[i]` has
+/// become the face order.face_number[i], its corners perhaps rotated.
+void pack_source(const SourceSurface& source, const SurfaceOrder& order, const Surface& ordered, LevelData& level);
 
 }  // namespace farfield

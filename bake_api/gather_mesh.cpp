@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "base/index.h"
+#include "import/corner_normals.h"
 
 namespace farfield {
 namespace {
@@ -186,9 +187,7 @@ void append(const BakeMesh& mesh, const glm::dmat4x3& to_asset, const Attributes
         out.corner_uv.push_back(value_at(mesh.uv, corner, point, vec2(std::numeric_limits<float>::quiet_NaN())));
       }
       if (has.normals) {
-        const dvec3 normal = of_normals * dvec3(value_at(mesh.normals, corner, point, vec3(0.0f)));
-        const double length = glm::length(normal);
-        out.corner_normal.push_back(length > 0 ? vec3(normal / length) : vec3(0.0f));
+        out.corner_normal.push_back(unit_normal(of_normals * dvec3(value_at(mesh.normals, corner, point, vec3(0.0f)))));
       }
       if (has.colors) out.corner_color.push_back(value_at(mesh.colors, corner, point, vec4(1.0f)));
     }

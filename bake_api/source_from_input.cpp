@@ -62,10 +62,7 @@ void add_material(const SourceMaterial& m, TextureHashes& textures, ContentHash&
     hash.add(factor);
   }
   hash.add(m.alpha_mode);
-  for (const SourceTexture* map :
-       {&m.base_color_map, &m.metallic_roughness_map, &m.alpha_map, &m.normal_map, &m.emission_map}) {
-    hash.add(textures.of(*map));
-  }
+  for (const SourceTexture* map : m.maps()) hash.add(textures.of(*map));
 }
 
 uint64_t hash_of(const SourceMesh& mesh, const std::string& material_key) {

@@ -3,6 +3,7 @@
 // keep of them for close-ups.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 
@@ -45,6 +46,14 @@ struct SurfaceMaterial : MaterialFactors {
   Map alpha_map;               ///< OBJ's map_d: its alpha channel multiplies
   Map normal_map;              ///< tangent space, as stored: (r, g, b) in [0, 1] is 2 (r, g, b) - 1
   Map emission_map;            ///< linear RGB; multiplies emission
+
+  /// All of them, in this order.
+  std::array<Map*, 5> maps() {
+    return {&base_color_map, &metallic_roughness_map, &alpha_map, &normal_map, &emission_map};
+  }
+  std::array<const Map*, 5> maps() const {
+    return {&base_color_map, &metallic_roughness_map, &alpha_map, &normal_map, &emission_map};
+  }
 };
 
 }  // namespace farfield

@@ -19,7 +19,7 @@ bool stops(const TracedLevel& level, const RayContext& context, const EmbreeRay&
     const vec3 direction(ray.dir_x, ray.dir_y, ray.dir_z);
     // The ray is in local space, but t is the world's: cones are in world units, along a unit direction there.
     const float width = (context.cone_width + context.cone_spread * ray.tfar) * glm::length(direction);
-    opacity = level.look->opacity(level, {face, face_barycentric(hit.u, hit.v), direction, width});
+    opacity = level.look->opacity(level.view, {hit.primID, face, face_barycentric(hit.u, hit.v), direction, width});
   }
   const uint64_t bits = mix64(mix64(context.ray_seed, face), std::bit_cast<uint32_t>(ray.tfar));
   return to_unit_float(bits) < opacity;

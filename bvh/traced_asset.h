@@ -14,11 +14,10 @@
 
 namespace farfield {
 
-struct TracedLevel;
-
 /// A point on a level's surface as a ray meets it, in the level's local space.
 struct SurfacePoint {
-  uint32_t face;
+  uint32_t quad;
+  uint32_t face;     ///< one of the quad's
   vec2 barycentric;  ///< weights of the face's second and third corner
   vec3 direction;    ///< of the ray, any length
   float width;       ///< of what the ray stands for there
@@ -29,7 +28,7 @@ class SurfaceLook {
  public:
   virtual ~SurfaceLook() = default;
   /// The share of rays that a face stops there, of one whose face_opacity is neither 0 nor 255.
-  virtual float opacity(const TracedLevel& level, const SurfacePoint& point) const = 0;
+  virtual float opacity(const LevelView& level, const SurfacePoint& point) const = 0;
 };
 
 /// A loaded level. Immutable; any thread. Does not move: its scene refers to it.

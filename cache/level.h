@@ -21,6 +21,8 @@ namespace farfield {
 struct Quad {
   uint32_t v0, v1, v2, v3;
   bool is_pair() const { return v2 != v3; }
+  /// The corners of face 0 or 1.
+  uvec3 face(uint32_t number) const { return number == 0 ? uvec3(v0, v1, v3) : uvec3(v2, v3, v1); }
 };
 static_assert(sizeof(Quad) == 16);
 

@@ -145,12 +145,6 @@ std::string unknown_extensions(const Model& model) {
   return names;
 }
 
-/// -1 (absent) or a valid index.
-template <typename T>
-bool is_index(int index, const std::vector<T>& of) {
-  return index >= -1 && index < static_cast<int>(of.size());
-}
-
 Result<void> check_meshes(const GltfDocument& document) {
   const Model& model = document.model;
   for (size_t m = 0; m < model.meshes.size(); ++m) {

@@ -44,6 +44,12 @@ int image_of(const tinygltf::Texture& texture);
 /// How many components the elements of an accessor have (VEC3: 3). The index must be valid.
 int component_count(const GltfDocument& document, int accessor);
 
+/// -1 (absent) or a valid index.
+template <typename T>
+bool is_index(int index, const std::vector<T>& of) {
+  return index >= -1 && index < static_cast<int>(of.size());
+}
+
 /// A number of an extension object, if it is there and finite.
 std::optional<double> extension_number(const tinygltf::Value& object, const char* key);
 /// An array of three numbers of an extension object, if it is there.

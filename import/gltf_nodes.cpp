@@ -11,12 +11,6 @@ namespace {
 
 using tinygltf::Model;
 
-/// -1 (absent) or a valid index.
-template <typename T>
-bool is_index(int index, const std::vector<T>& of) {
-  return index >= -1 && index < static_cast<int>(of.size());
-}
-
 /// Zero and NaN quaternions become the identity.
 glm::dvec4 unit_quaternion(const glm::dvec4& q) {
   const double length = glm::length(q);

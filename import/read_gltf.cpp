@@ -258,12 +258,8 @@ class MaterialReader {
 
   /// Whether a map that was just read can go by the coordinates of those before it: one set per corner is kept.
   static bool shares_uv(const SourceMaterial& material, UvSource& uv, const UvSource& wanted) {
-    int maps = 0;
-    for (const SourceTexture* map :
-         {&material.base_color_map, &material.metallic_roughness_map, &material.normal_map, &material.emission_map}) {
-      maps += bool(*map);
-    }
-    if (maps == 1) uv = wanted;
+    const auto maps = material.maps();
+    if (std::ranges::count_if(maps, [](const SourceTexture* map) { return bool(*map); }) == 1) uv = wanted;
     return uv == wanted;
   }
 
@@ -534,7 +530,7 @@ class GltfMeshReader {
   Result<void> add_uvs(const tinygltf::Primitive& primitive, const std::vector<uvec3>& triangles, uint32_t material,
                        size_t vertex_count, size_t first_corner, const std::string& place) {
     const SourceMaterial& m = mesh_.materials[material];
-    if (!m.base_color_map && !m.metallic_roughness_map && !m.normal_map && !m.emission_map) return {};
+    if (std::ranges::none_of(m.maps(), [](const SourceTexture* map) { return bool(*map); })) return {};
     const UvSource& source = materials_.uv(material);
     const auto attribute = primitive.attributes.find(fmt::format("TEXCOORD_{}", source.set));
     if (attribute == primitive.attributes.end()) {

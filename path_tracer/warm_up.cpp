@@ -86,8 +86,8 @@ Result<void> add_texture(const fs::path& folder, Manifest& manifest) {
 
 void add_coordinates(LevelData& level) {
   for (const Quad& quad : level.quads) {
-    level.corner_vertex.push_back({quad.v0, quad.v1, quad.v3});
-    level.corner_vertex.push_back({quad.v2, quad.v3, quad.v1});
+    level.corner_vertex.push_back(quad.face(0));
+    level.corner_vertex.push_back(quad.face(1));
   }
   for (const vec3& position : level.positions) level.shading_uv.emplace_back(position.x, position.z);
 }

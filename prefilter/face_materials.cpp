@@ -190,22 +190,18 @@ bool is_varied(const SourceSurface& source, const TrianglePart& part, float widt
   if (is_uniform(source, part)) return false;
   const int steps = static_cast<int>(std::clamp(std::ceil(longest_side(source, part) / width), 1.0f, 24.0f));
   const float share = share_of(part) / static_cast<float>(steps * steps);
-  Look lower{MaterialSample{}}, upper = lower;
-  vec3 first_normal(0.0f);
+  Look lower{MaterialSample{}}, upper = lower;  // from the first spot on; both keep its normal
   for (int i = 0; i <= steps; ++i) {
     for (int j = 0; i + j <= steps; ++j) {
       const vec2 at = vec2(i, j) / static_cast<float>(steps);
       const Look look(sample_spot(source, part.triangle, part.at({1 - at.x - at.y, at.x, at.y}), share));
-      if (i + j == 0) {
-        lower = upper = look;
-        first_normal = look.normal;
-      }
+      if (i + j == 0) lower = upper = look;
       for (size_t c = 0; c < look.channels.size(); ++c) {
         lower.channels[c] = std::min(lower.channels[c], look.channels[c]);
         upper.channels[c] = std::max(upper.channels[c], look.channels[c]);
         if (upper.channels[c] - lower.channels[c] > kVisibleStep) return true;
       }
-      if (glm::dot(look.normal, first_normal) < std::cos(kVisibleAngle)) return true;
+      if (glm::dot(look.normal, lower.normal) < std::cos(kVisibleAngle)) return true;
     }
   }
   return false;

@@ -7,7 +7,6 @@
 namespace farfield {
 namespace {
 
-constexpr float kMaxUv = 1e6f;
 // A triangle that covers more texels than this is averaged from a half-size level: its border texels, the only ones
 // that lose exactness, are then a small part of it.
 constexpr double kMaxTexels = 2048;
@@ -47,17 +46,16 @@ const Texture::Level& matching_level(const Texture& image, int width) {
   return image.level(level);
 }
 
-/// The texture whose texels are walked; the others are looked up at their centres.
+/// The texture whose texels are walked: the first. The others are looked up at their centres.
 const SourceTexture& driver(const SourceMaterial& m) {
-  for (const SourceTexture* map : {&m.base_color_map, &m.metallic_roughness_map, &m.alpha_map, &m.normal_map}) {
-    if (*map) return *map;
-  }
-  return m.emission_map;
+  const auto maps = m.maps();
+  const auto found = std::ranges::find_if(maps, [](const SourceTexture* map) { return bool(*map); });
+  return found == maps.end() ? *maps.back() : **found;
 }
 
 /// The normal that a normal map's texel means. Of texels that are averages themselves a mean, shorter than 1.
 vec3 decode_normal(const vec4& texel, float scale, bool is_average) {
-  const vec3 normal = (2.0f * vec3(texel) - 1.0f) * vec3(scale, scale, 1);
+  const vec3 normal = mapped_normal(vec3(texel), scale);
   const float length = glm::length(normal);
   if (!(length > 1e-6f)) return {0, 0, 1};
   return is_average && length < 1 ? normal : normal / length;
@@ -222,10 +220,7 @@ MapMeans average_whole(const SourceMaterial& material, float vertex_alpha) {
 
 bool has_textures(const SourceMaterial& m) { return bool(driver(m)); }
 
-bool is_usable(const UvTriangle& uv) {
-  return std::all_of(uv.begin(), uv.end(),
-                     [](const vec2& c) { return std::abs(c.x) <= kMaxUv && std::abs(c.y) <= kMaxUv; });
-}
+bool is_usable(const UvTriangle& uv) { return std::ranges::all_of(uv, is_usable_uv); }
 
 MapMeans average_textures(const SourceMaterial& material, const UvTriangle& uv, float vertex_alpha) {
   if (!has_textures(material)) return means_without_maps(material, vertex_alpha);

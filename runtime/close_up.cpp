@@ -10,34 +10,39 @@
 namespace farfield {
 namespace {
 
-constexpr float kMaxUv = 1e6f;           // beyond, float has no texels any more
 constexpr float kLongestStretch = 16;    // of a footprint at grazing angles
 constexpr float kUnevenLengths = 0.01f;  // normals in files are rounded: no spread
 
-template <typename T>
-T interpolate(ArrayView<T> values, const uvec3& corners, vec2 b) {
-  return (1 - b.x - b.y) * values[corners.x] + b.x * values[corners.y] + b.y * values[corners.z];
+/// Between a face's corners; at(i) gives shading vertex i.
+template <typename At>
+auto interpolate(const uvec3& corners, vec2 b, const At& at) {
+  return (1 - b.x - b.y) * at(corners.x) + b.x * at(corners.y) + b.y * at(corners.z);
 }
 
 vec3 interpolate_normals(const LevelView& level, const uvec3& corners, vec2 b) {
-  const auto at = [&](uint32_t i) { return unpack_normal(level.shading_normal[i]); };
-  const vec3 normal = (1 - b.x - b.y) * at(corners.x) + b.x * at(corners.y) + b.y * at(corners.z);
+  const vec3 normal = interpolate(corners, b, [&](uint32_t i) { return unpack_normal(level.shading_normal[i]); });
   const float length = glm::length(normal);
   return length > 1e-6f ? normal / length : vec3(0.0f);
 }
 
-vec4 interpolate_colors(const LevelView& level, const uvec3& corners, vec2 b) {
-  const auto at = [&](uint32_t i) { return unpack_vertex_color(level.shading_color[i]); };
-  return (1 - b.x - b.y) * at(corners.x) + b.x * at(corners.y) + b.y * at(corners.z);
-}
-
-/// The quad that holds a face: faces are numbered along them.
-uvec3 triangle_of(const LevelView& level, uint32_t face) {
-  const auto after = std::ranges::upper_bound(level.quad_first_face, face);
-  const auto quad_index = static_cast<size_t>(after - level.quad_first_face.begin()) - 1;
-  const Quad& quad = level.quads[quad_index];
-  return face == level.quad_first_face[quad_index] ? uvec3(quad.v0, quad.v1, quad.v3)
-                                                   : uvec3(quad.v2, quad.v3, quad.v1);
+/// The point in the terms of the source.
+SourcePoint source_point(const LevelView& level, const SurfacePoint& point) {
+  const uint32_t face = point.face;
+  const vec2 b = point.barycentric;
+  SourcePoint out;
+  if (!level.face_material.empty()) out.material = level.face_material[face];
+  out.barycentric = b;
+  if (!level.source_face.empty()) {
+    out.source_face = level.source_face[face] >> kSourceTurnBits;
+    const vec3 weights(1 - b.x - b.y, b.x, b.y);
+    const int turn = static_cast<int>(level.source_face[face] & ((1u << kSourceTurnBits) - 1));  // 3 in damaged files
+    out.barycentric = {weights[(4 - turn) % 3], weights[(5 - turn) % 3]};
+  }
+  if (level.corner_vertex.empty()) return out;
+  const uvec3& corners = level.corner_vertex[face];
+  if (!level.shading_uv.empty()) out.uv = interpolate(corners, b, [&](uint32_t i) { return level.shading_uv[i]; });
+  if (!level.shading_normal.empty()) out.normal = interpolate_normals(level, corners, b);
+  return out;
 }
 
 }  // namespace
@@ -51,18 +56,20 @@ struct CloseUp::Place {
   vec2 duv_dx{0.0f}, duv_dy{0.0f};  ///< the whole way across the footprint
   bool has_uv = false;              ///< usable ones
 
-  Place(const LevelView& level, const SurfacePoint& point) : at(source_point(level, point.face, point.barycentric)) {
+  Place(const LevelView& level, const SurfacePoint& point) : at(source_point(level, point)) {
     if (level.corner_vertex.empty()) return;
     const uvec3& corners = level.corner_vertex[point.face];
-    if (!level.shading_color.empty()) color = interpolate_colors(level, corners, point.barycentric);
+    if (!level.shading_color.empty()) {
+      color = interpolate(corners, point.barycentric,
+                          [&](uint32_t i) { return unpack_vertex_color(level.shading_color[i]); });
+    }
     if (level.shading_uv.empty()) return;
-    const uvec3 triangle = triangle_of(level, point.face);
+    const uvec3 triangle = level.quads[point.quad].face(point.face - level.quad_first_face[point.quad]);
     for (size_t k = 0; k < 3; ++k) {
       positions[k] = level.positions[triangle[static_cast<int>(k)]];
       uvs[k] = level.shading_uv[corners[static_cast<int>(k)]];
     }
-    has_uv =
-        std::ranges::all_of(uvs, [](const vec2& uv) { return std::abs(uv.x) <= kMaxUv && std::abs(uv.y) <= kMaxUv; });
+    has_uv = std::ranges::all_of(uvs, is_usable_uv);
     if (has_uv) set_footprint(point);
   }
 
@@ -95,23 +102,6 @@ struct CloseUp::Place {
   }
 };
 
-SourcePoint source_point(const LevelView& level, uint32_t face, vec2 barycentric) {
-  SourcePoint point;
-  if (!level.face_material.empty()) point.material = level.face_material[face];
-  point.barycentric = barycentric;
-  if (!level.source_face.empty()) {
-    point.source_face = level.source_face[face] >> kSourceTurnBits;
-    const vec3 weights(1 - barycentric.x - barycentric.y, barycentric.x, barycentric.y);
-    const int turn = static_cast<int>(level.source_face[face] & ((1u << kSourceTurnBits) - 1));  // 3 in damaged files
-    point.barycentric = {weights[(4 - turn) % 3], weights[(5 - turn) % 3]};
-  }
-  if (level.corner_vertex.empty()) return point;
-  const uvec3& corners = level.corner_vertex[face];
-  if (!level.shading_uv.empty()) point.uv = interpolate(level.shading_uv, corners, barycentric);
-  if (!level.shading_normal.empty()) point.normal = interpolate_normals(level, corners, barycentric);
-  return point;
-}
-
 CloseUp::CloseUp(const std::filesystem::path& folder, const Manifest& manifest, MaterialFunction function,
                  TextureCache& textures)
     : function_(std::move(function)), textures_(textures) {
@@ -124,51 +114,46 @@ CloseUp::CloseUp(const std::filesystem::path& folder, const Manifest& manifest, 
   for (const AssetMaterial& from : manifest.materials) {
     Material& to = materials_.emplace_back();
     static_cast<MaterialFactors&>(to) = from;
-    to.base_color_map = open(from.base_color_map);
-    to.metallic_roughness_map = open(from.metallic_roughness_map);
-    to.alpha_map = open(from.alpha_map);
-    to.normal_map = open(from.normal_map);
-    to.emission_map = open(from.emission_map);
+    for (size_t i = 0; i < to.maps().size(); ++i) *to.maps()[i] = open(*from.maps()[i]);
     to.mask_map = open(from.mask_map);
-    to.has_maps = to.base_color_map || to.metallic_roughness_map || to.alpha_map || to.normal_map || to.emission_map ||
-                  to.mask_map;
+    to.has_maps = to.mask_map || std::ranges::any_of(to.maps(), [](const Map* map) { return bool(*map); });
     has_maps_ |= to.has_maps;
   }
   for (const AssetTexture& texture : manifest.textures) textures.add_bytes(texture.cache_bytes);
 }
 
-float CloseUp::opacity(const TracedLevel& level, const SurfacePoint& point) const {
-  const Place place(level.view, point);
+float CloseUp::opacity(const LevelView& level, const SurfacePoint& point) const {
+  const Place place(level, point);
   std::optional<float> opacity;
   if (function_) {
     opacity = ask_host(place, true).opacity;
-  } else if (const Material* material = varying_material(level.view, place)) {
+  } else if (const Material* material = varying_material(level, place)) {
     opacity = opacity_at(*material, place);
   }
-  return opacity ? *opacity : unpack_unorm8(level.view.face_opacity[point.face]);
+  return opacity ? *opacity : unpack_unorm8(level.face_opacity[point.face]);
 }
 
-std::optional<CloseUpSample> CloseUp::sample(const LevelView& level, const SurfacePoint& point) const {
-  const bool is_plain = !function_ && !has_maps_ && level.corner_vertex.empty();
-  if (is_plain) return {};
+CloseUpSample CloseUp::sample(const LevelView& level, const SurfacePoint& point) const {
   const Place place(level, point);
-  std::optional<MaterialSample> material;
+  CloseUpSample out{place.at, {}};
   if (function_) {
-    material = ask_host(place, false);
+    out.material = ask_host(place, false);
   } else if (const Material* varying = varying_material(level, place)) {
-    material = sample_at(*varying, place);
+    out.material = sample_at(*varying, place);
   }
-  if (!material) return {};
-  CloseUpSample out{*material, place.at.normal};
-  if (place.has_uv && (material->normal.x != 0 || material->normal.y != 0)) {
-    vec3 smooth = place.at.normal;
-    if (smooth == vec3(0.0f)) {
-      const auto& p = place.positions;
-      smooth = glm::normalize(glm::cross(p[1] - p[0], p[2] - p[0]));
-    }
-    out.normal = TangentFrame(place.positions, place.uvs).bend(smooth, material->normal);
-  }
+  if (out.material && place.has_uv) out.at.normal = mapped(place, out.material->normal);
   return out;
+}
+
+/// The shading normal, bent as a normal in the tangent frame says.
+vec3 CloseUp::mapped(const Place& place, const vec3& in_frame) {
+  vec3 smooth = place.at.normal;
+  if (in_frame.x == 0 && in_frame.y == 0) return smooth;
+  if (smooth == vec3(0.0f)) {
+    const auto& p = place.positions;
+    smooth = glm::normalize(glm::cross(p[1] - p[0], p[2] - p[0]));
+  }
+  return TangentFrame(place.positions, place.uvs).bend(smooth, in_frame);
 }
 
 /// The material of a place, if it says more there than what the face is on average.
@@ -225,10 +210,10 @@ std::optional<MaterialSample> CloseUp::sample_at(const Material& m, const Place&
   }
   if (m.normal_map) {
     if (!look_up(m.normal_map, place, value)) return {};
-    means.normal = (2.0f * vec3(value) - 1.0f) * vec3(m.normal_scale, m.normal_scale, 1);
+    means.normal = mapped_normal(vec3(value), m.normal_scale);
     const float length2 = glm::dot(means.normal, means.normal);
     const float aside = std::clamp(0.5f * (1 - length2) - kUnevenLengths, 0.0f, 1.0f / 3);
-    means.roughness2 = std::min(means.roughness2 + aside / (1 - 2 * aside), 1.0f);
+    means.roughness2 = std::min(means.roughness2 + roughness2_of_spread(aside), 1.0f);
   }
   return material_sample(m, means, vec3(place.color));
 }

@@ -20,14 +20,14 @@ struct SourcePoint {
   uint32_t source_face = kNoIndex;  ///< kNoIndex: not kept
   vec2 barycentric{0.0f};           ///< weights of the source's second and third corner
   vec2 uv{NAN};
-  vec3 normal{0.0f};  ///< shading normal in local space, unit; 0: the face's own
+  vec3 normal{0.0f};  ///< shading normal in local space, unit, on either side; 0: the face's own
 };
-SourcePoint source_point(const LevelView& level, uint32_t face, vec2 barycentric);
 
-/// How a point of level 0 reflects, and the normal there.
+/// What is at a point of level 0; the normal bent by the material's normal map.
 struct CloseUpSample {
-  std::optional<MaterialSample> material;  ///< nothing: what the face is on average
-  vec3 normal{0.0f};                       ///< in local space, unit, on either side; 0: the face's own
+  SourcePoint at;
+  /// Nothing where the face's average is all that is known: no varying material, or its textures cannot be read now.
+  std::optional<MaterialSample> material;
 };
 
 /// An asset's materials. Refers to the cache. Immutable once made; any thread.
@@ -37,9 +37,8 @@ class CloseUp final : public SurfaceLook {
   CloseUp(const std::filesystem::path& folder, const Manifest& manifest, MaterialFunction function,
           TextureCache& textures);
 
-  float opacity(const TracedLevel& level, const SurfacePoint& point) const override;
-  /// Nothing where faces are all that is known: no varying material, or its textures cannot be read now.
-  std::optional<CloseUpSample> sample(const LevelView& level, const SurfacePoint& point) const;
+  float opacity(const LevelView& level, const SurfacePoint& point) const override;
+  CloseUpSample sample(const LevelView& level, const SurfacePoint& point) const;
 
   /// The name of a material; empty for a number that there is not.
   const std::string& material_name(uint32_t material) const;
@@ -63,6 +62,7 @@ class CloseUp final : public SurfaceLook {
   const Material* varying_material(const LevelView& level, const Place& place) const;
   std::optional<float> opacity_at(const Material& material, const Place& place) const;
   std::optional<MaterialSample> sample_at(const Material& material, const Place& place) const;
+  static vec3 mapped(const Place& place, const vec3& in_frame);
   MaterialSample ask_host(const Place& place, bool opacity_only) const;
   bool look_up(const Map& map, const Place& place, vec4& value) const;
 

@@ -13,6 +13,7 @@
 
 #include "runtime/close_up.h"
 #include "runtime/interaction_model.h"
+#include "scattering/material_model.h"
 
 namespace farfield {
 
@@ -76,18 +77,18 @@ SurfaceParams face_params(const LevelView& level, uint32_t face) {
   return params;
 }
 
-/// The normal around which a narrow distribution lies, and how far it spreads: like the roughness2 of a GGX lobe.
-/// Nothing for a wide one.
+/// The normal around which a distribution with a main direction lies, and how far it spreads: like the roughness2 of a
+/// GGX lobe. Nothing for one without (docs/decisions/0011).
 struct NarrowNormals {
   vec3 normal;
   float roughness2;
 };
 std::optional<NarrowNormals> narrow_normals(const SymMat3& s, const vec3& start) {
-  constexpr float kNarrow = 0.55f;  // of the trace: within about 18 degrees
+  constexpr float kNarrow = 0.55f;  // of the trace
   const float trace = s.trace();
   if (!(trace > 0)) return {};
   vec3 normal = start;
-  for (int i = 0; i < 4; ++i) {  // power iterations: each at least divides the error by 9 where it is narrow
+  for (int i = 0; i < 4; ++i) {  // power iterations: rough only where a second direction is nearly as strong
     const vec3 next = s * normal;
     const float length = glm::length(next);
     if (!(length > 1e-6f * trace)) return {};
@@ -96,7 +97,7 @@ std::optional<NarrowNormals> narrow_normals(const SymMat3& s, const vec3& start)
   const float along = s.quadratic(normal) / trace;
   if (!(along >= kNarrow)) return {};
   const float aside = 0.5f * std::max(1 - along, 0.0f);
-  return NarrowNormals{normal, aside / (1 - 2 * aside)};
+  return NarrowNormals{normal, roughness2_of_spread(aside)};
 }
 
 /// On wo's side of the surface, and not beyond its own horizon.
@@ -145,27 +146,30 @@ bool is_hit_of(const TracedLevel& level, const HitRecord& hit) {
 
 namespace {
 
-/// The close-up of a hit's level, where it has one: fills in what the interaction says of the source.
-std::optional<CloseUpSample> look_closely(const TracedLevel& level, const HitRecord& hit, const vec3& local_direction,
-                                          float local_width, Interaction& interaction) {
-  const uint32_t face = level.face_of(hit.element / 2, hit.element % 2);
-  const vec2 barycentric(hit.barycentric[0], hit.barycentric[1]);
-  const SourcePoint source = source_point(level.view, face, barycentric);
+/// What level 0 is at a hit, in place of its face's average; the shading normal in world space, or `normal`.
+vec3 look_closely(const TracedLevel& level, const SurfacePoint& point, const InstanceRecord& instance,
+                  const vec3& normal, Interaction& interaction, SurfaceParams& params) {
+  const auto& close_up = static_cast<const CloseUp&>(*level.look);  // the runtime gives levels no other
+  const auto [source, material] = close_up.sample(level.view, point);
   interaction.material = source.material;
   interaction.source_face = source.source_face;
   interaction.barycentric = source.barycentric;
   interaction.uv = source.uv;
-  const auto& close_up = static_cast<const CloseUp&>(*level.look);  // the runtime gives levels no other
-  auto sample = close_up.sample(level.view, {face, barycentric, local_direction, local_width});
-  if (sample || source.normal == vec3(0.0f)) return sample;
-  return CloseUpSample{std::nullopt, source.normal};
+  if (material) {
+    params.diffuse = material->diffuse;
+    params.specular = material->specular;
+    params.transmission = material->transmission;
+    params.roughness2 = std::pow(material->roughness, 4.0f);
+    interaction.emission = material->emission;
+  }
+  return source.normal == vec3(0.0f) ? normal : glm::normalize(instance.normal_to_world(source.normal));
 }
 
 /// How the surface reflects at a hit, with its geometric normal known; sets the shading normal and what it emits.
 SurfaceParams shade_surface(const TracedLevel& level, const InstanceRecord& instance, const HitRecord& hit,
                             const vec3& world_direction, Interaction& interaction) {
   const LevelView& view = level.view;
-  const uint32_t face = level.face_of(hit.element / 2, hit.element % 2);
+  const uint32_t quad = hit.element / 2, face = level.face_of(quad, hit.element % 2);
   SurfaceParams params = face_params(view, face);
   interaction.emission = emission_at(view.face_emission, face);
   vec3 normal = interaction.geometric_normal;
@@ -173,16 +177,8 @@ SurfaceParams shade_surface(const TracedLevel& level, const InstanceRecord& inst
   if (level.look) {
     const vec3 local = instance.vector_to_local(world_direction);
     const float width = hit.footprint * glm::length(local) / glm::length(world_direction);
-    if (const auto sample = look_closely(level, hit, local, width, interaction)) {
-      if (sample->normal != vec3(0.0f)) normal = glm::normalize(instance.normal_to_world(sample->normal));
-      if (const auto& material = sample->material) {
-        params.diffuse = material->diffuse;
-        params.specular = material->specular;
-        params.transmission = material->transmission;
-        params.roughness2 = std::pow(material->roughness, 4.0f);
-        interaction.emission = material->emission;
-      }
-    }
+    const vec2 barycentric(hit.barycentric[0], hit.barycentric[1]);
+    normal = look_closely(level, {quad, face, barycentric, local, width}, instance, normal, interaction, params);
   } else if (!view.face_sggx.empty()) {
     params.sggx = to_world(unpack(view.face_sggx[face]), instance);
     if (const auto narrow = narrow_normals(params.sggx, normal)) {

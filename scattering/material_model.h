@@ -24,6 +24,19 @@ struct MapMeans {
   vec3 normal{0, 0, 1};  ///< mean of unit normals in the tangent frame: shorter where they spread
 };
 
+/// Whether texture coordinates can be used: finite, and not so large that float has no texels there any more.
+inline bool is_usable_uv(const vec2& uv) {
+  constexpr float kLargest = 1e6f;
+  return std::abs(uv.x) <= kLargest && std::abs(uv.y) <= kLargest;  // false for NaN
+}
+
+/// What a texel of a normal map means, in the tangent frame; of any length.
+inline vec3 mapped_normal(const vec3& texel, float scale) { return (2.0f * texel - 1.0f) * vec3(scale, scale, 1); }
+
+/// The roughness2 of a GGX lobe that spreads as far as normals do of whose second moment (trace 1) a share of `aside`
+/// lies along each of the two axes beside their mean; in [0, 1/2).
+inline float roughness2_of_spread(float aside) { return aside / (1 - 2 * aside); }
+
 /// The means of a material whose maps are missing or not looked at.
 inline MapMeans means_without_maps(const MaterialFactors& material, float vertex_alpha = 1) {
   MapMeans means;

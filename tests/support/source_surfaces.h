@@ -33,6 +33,19 @@ inline SourceSurface source_of(const Surface& surface) {
   return source;
 }
 
+/// The square [0, 1]^2 in the plane z = 0 as a reader gives it: one polygon, texture coordinates (x, y), white.
+inline SourceMesh square_mesh() {
+  SourceMesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  mesh.corner_position = {0, 1, 2, 3};
+  mesh.face_begin = {0, 4};
+  mesh.corner_uv = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  mesh.face_material = {0};
+  mesh.materials.resize(1);
+  mesh.materials[0].base_color = vec3(1.0f);
+  return mesh;
+}
+
 inline ImportedAsset asset_of(const Surface& surface, uint64_t source_hash = 0) {
   ImportedAsset asset;
   asset.source = source_of(surface);

@@ -465,13 +465,7 @@ TEST_F(Bake, DoesNotVoxeliseWhatCannotSaveAnything) {
 ImportedAsset textured_square(int side) {
   std::vector<vec4> texels;
   for (int i = 0; i < side * side; ++i) texels.emplace_back(vec3(static_cast<float>(mix64(i) % 1000) / 1000), 1);
-  SourceMesh mesh;
-  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
-  mesh.corner_position = {0, 1, 2, 3};
-  mesh.face_begin = {0, 4};
-  mesh.corner_uv = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-  mesh.face_material = {0};
-  mesh.materials.resize(1);
+  SourceMesh mesh = test::square_mesh();
   mesh.materials[0].name = "noise";
   mesh.materials[0].base_color_map.image = std::make_shared<const Texture>(side, side, texels);
   return std::move(*condition(std::move(mesh), "square"));

@@ -9,6 +9,7 @@
 #include "tests/support/files.h"
 #include "tests/support/images.h"
 #include "tests/support/runtime_host.h"
+#include "tests/support/source_surfaces.h"
 
 namespace farfield {
 namespace {
@@ -16,19 +17,6 @@ namespace {
 using test::image;
 
 namespace fs = std::filesystem;
-
-/// The square [0, 1]^2 in the plane z = 0, one polygon, texture coordinates (x, y).
-SourceMesh square() {
-  SourceMesh mesh;
-  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
-  mesh.corner_position = {0, 1, 2, 3};
-  mesh.face_begin = {0, 4};
-  mesh.corner_uv = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-  mesh.face_material = {0};
-  mesh.materials.resize(1);
-  mesh.materials[0].base_color = vec3(1.0f);
-  return mesh;
-}
 
 class CloseUp : public ::testing::Test {
  protected:
@@ -74,7 +62,7 @@ void expect_near(const vec3& a, const vec3& b, float tolerance) {
 }
 
 TEST_F(CloseUp, ShowsTexelsWhereTheyAre) {
-  SourceMesh mesh = square();
+  SourceMesh mesh = test::square_mesh();
   mesh.materials[0].name = "tiles";
   mesh.materials[0].base_color_map.image =
       image(4, [](int x, int y) { return vec4(x == 1 ? 0.8f : 0.1f, y == 2 ? 0.6f : 0.2f, 0.25f, 1); });
@@ -96,7 +84,7 @@ TEST_F(CloseUp, ShowsTexelsWhereTheyAre) {
 }
 
 TEST_F(CloseUp, WideRaysSeeAverages) {
-  SourceMesh mesh = square();
+  SourceMesh mesh = test::square_mesh();
   mesh.materials[0].base_color_map.image = image(64, [](int x, int y) { return vec4(vec3(float((x + y) % 2)), 1); });
   ASSERT_NO_FATAL_FAILURE(show(std::move(mesh)));
   expect_near(look(0.5f, 0.5f, 0.25f).albedo, vec3(0.5f), 0.02f);
@@ -104,7 +92,7 @@ TEST_F(CloseUp, WideRaysSeeAverages) {
 }
 
 TEST_F(CloseUp, CornersAreThoseOfTheSourcesTriangles) {
-  SourceMesh mesh = square();
+  SourceMesh mesh = test::square_mesh();
   mesh.corner_position = {0, 1, 2, 2, 3, 0};
   mesh.face_begin = {0, 3, 6};
   mesh.corner_uv.clear();
@@ -131,7 +119,7 @@ TEST_F(CloseUp, CornersAreThoseOfTheSourcesTriangles) {
 }
 
 TEST_F(CloseUp, NormalsAreInterpolatedAndOnTheSideOfTheRay) {
-  SourceMesh mesh = square();
+  SourceMesh mesh = test::square_mesh();
   const float s = std::sqrt(0.5f);
   mesh.corner_normal = {{-s, 0, s}, {s, 0, s}, {s, 0, s}, {-s, 0, s}};
   ASSERT_NO_FATAL_FAILURE(show(std::move(mesh)));
@@ -145,7 +133,7 @@ TEST_F(CloseUp, NormalsAreInterpolatedAndOnTheSideOfTheRay) {
 }
 
 TEST_F(CloseUp, NormalMapsBendNormalsAlongTheTexturesAxes) {
-  SourceMesh mesh = square();
+  SourceMesh mesh = test::square_mesh();
   const vec3 n = glm::normalize(vec3(0.5f, 0.25f, 1));
   mesh.materials[0].normal_map.image = image(2, [&](int, int) { return vec4(0.5f * n + 0.5f, 1); });
   ASSERT_NO_FATAL_FAILURE(show(std::move(mesh)));
@@ -154,7 +142,7 @@ TEST_F(CloseUp, NormalMapsBendNormalsAlongTheTexturesAxes) {
 }
 
 TEST_F(CloseUp, NothingLeavesThroughTheSurfaceWhereNormalsDisagree) {
-  SourceMesh mesh = square();
+  SourceMesh mesh = test::square_mesh();
   const vec3 tilted = glm::normalize(vec3(1, 0, 0.3f));
   mesh.corner_normal.assign(4, tilted);
   ASSERT_NO_FATAL_FAILURE(show(std::move(mesh)));
@@ -169,7 +157,7 @@ TEST_F(CloseUp, NothingLeavesThroughTheSurfaceWhereNormalsDisagree) {
 }
 
 TEST_F(CloseUp, MasksAreTestedAtTheHit) {
-  SourceMesh mesh = square();
+  SourceMesh mesh = test::square_mesh();
   mesh.materials[0].alpha_mode = AlphaMode::Mask;
   mesh.materials[0].base_color_map.image = image(8, [](int x, int) { return vec4(0.5f, 0.5f, 0.5f, x < 2 ? 1 : 0); });
   ASSERT_NO_FATAL_FAILURE(show(std::move(mesh)));
@@ -184,7 +172,7 @@ TEST_F(CloseUp, MasksAreTestedAtTheHit) {
 }
 
 TEST_F(CloseUp, BlendedFacesLetTheirShareOfRaysPass) {
-  SourceMesh mesh = square();
+  SourceMesh mesh = test::square_mesh();
   mesh.materials[0].alpha_mode = AlphaMode::Blend;
   mesh.materials[0].alpha = 0.5f;
   mesh.corner_color.assign(4, vec4(1, 1, 1, 0.6f));
@@ -195,7 +183,7 @@ TEST_F(CloseUp, BlendedFacesLetTheirShareOfRaysPass) {
 }
 
 TEST_F(CloseUp, FacesShine) {
-  SourceMesh mesh = square();
+  SourceMesh mesh = test::square_mesh();
   mesh.materials[0].emission = {3, 2, 1};
   mesh.materials[0].emission_map.image = image(2, [](int x, int) { return vec4(vec3(x == 0 ? 1.0f : 0.25f), 1); });
   ASSERT_NO_FATAL_FAILURE(show(std::move(mesh)));
@@ -204,7 +192,7 @@ TEST_F(CloseUp, FacesShine) {
 }
 
 TEST_F(CloseUp, TheHostsFunctionSaysWhatIsThere) {
-  SourceMesh mesh = square();
+  SourceMesh mesh = test::square_mesh();
   const MaterialFunction function = [](const MaterialQuery& query) {
     MaterialSample sample;
     sample.diffuse = {query.uv.x, query.uv.y, 0.5f};
@@ -225,7 +213,7 @@ TEST_F(CloseUp, TheHostsFunctionSaysWhatIsThere) {
 }
 
 TEST_F(CloseUp, TexturesThatDoNotFitLeaveAverages) {
-  SourceMesh mesh = square();
+  SourceMesh mesh = test::square_mesh();
   mesh.materials[0].base_color_map.image = image(512, [](int x, int) { return vec4(vec3(x < 256 ? 1.0f : 0.0f), 1); });
   ASSERT_NO_FATAL_FAILURE(show(std::move(mesh), {}, 1 << 20));
   EXPECT_NEAR(look(0.9f, 0.1f).albedo.x, 0.25f, 0.01f);  // the triangle (0,0) (1,0) (1,1): a quarter is white
@@ -240,7 +228,7 @@ TEST_F(CloseUp, TexturesThatDoNotFitLeaveAverages) {
 }
 
 TEST_F(CloseUp, ATextureThatIsGoneIsSaidOnce) {
-  SourceMesh mesh = square();
+  SourceMesh mesh = test::square_mesh();
   mesh.materials[0].base_color_map.image = image(64, [](int x, int) { return vec4(vec3(x < 32 ? 1.0f : 0.0f), 1); });
   ASSERT_NO_FATAL_FAILURE(show(std::move(mesh)));
   for (const char* content : {"", "no image"}) {
