@@ -167,7 +167,7 @@ struct VoxelRays {
     const FaceMaterial& m = geometry.materials[hit.triangle];
     const vec3 away = scattered_direction(m, hit.normal, direction, bits);
     const vec3 point = origin + hit.distance * direction;
-    escape.add(away, component_sum(m.diffuse + m.specular + m.transmission),
+    escape.add(away, component_sum(layered_albedo(m.specular, m.diffuse + m.transmission)),
                !is_blocked(point, away, kClearance * size, kEscapeLength * size, random));
   }
 };
@@ -192,7 +192,7 @@ SplitMix random_of_voxel(const ivec3& coordinate, uint64_t seed) {
 void let_escape(float ratio, Voxel& voxel) {
   voxel.self_shadowing = std::min(ratio, 1.0f);
   if (!(ratio > 1)) return;
-  const vec3 albedo = voxel.diffuse + voxel.specular + voxel.transmission;
+  const vec3 albedo = layered_albedo(voxel.specular, voxel.diffuse + voxel.transmission);
   const vec3 gain = cluster_albedo(glm::min(albedo, vec3(1.0f)), ratio) / glm::max(albedo, vec3(1e-6f));
   voxel.diffuse *= gain;
   voxel.specular *= gain;
