@@ -176,13 +176,11 @@ SurfaceParams shade_surface(const TracedLevel& level, const InstanceRecord& inst
     const vec2 barycentric(hit.barycentric[0], hit.barycentric[1]);
     normal = look_closely(level, {quad, face, barycentric, local, width}, instance, normal, interaction, params);
   } else if (!view.face_sggx.empty()) {
-    params.sggx = to_world(unpack(view.face_sggx[face]), instance);
-    const MainNormal main = main_normal(params.sggx, normal);
+    const MainNormal main = main_normal(to_world(unpack(view.face_sggx[face]), instance), normal);
     normal = main.normal;
     params.roughness2 = std::min(params.roughness2 + main.roughness2, 1.0f);
   }
   interaction.shading_normal = visible_normal(normal, interaction.geometric_normal, interaction.wo);
-  params.sggx = SymMat3::outer(interaction.shading_normal);
   return params;
 }
 
@@ -259,7 +257,7 @@ glm::vec3 Interaction::eval(const glm::vec3& wi, Rng& rng) const {
   if (kind == Kind::None) return vec3(0.0f);
   const InteractionModel& model = InteractionModel::of(*this);
   if (kind == Kind::Volume) return model.flakes.eval(wi, rng);
-  const vec3 value = is_on_one_side(*this, wi) ? model.surface.eval(wi, rng) : vec3(0.0f);
+  const vec3 value = is_on_one_side(*this, wi) ? model.surface.eval(wi) : vec3(0.0f);
   return model.horizon.chance > 0 ? value + model.horizon.eval(wi) : value;
 }
 
