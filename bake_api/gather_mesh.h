@@ -2,6 +2,7 @@
 // A host's arrays, checked and copied into the one mesh that the bake takes.
 #pragma once
 
+#include "base/job.h"
 #include "base/result.h"
 #include "farfield/bake.h"
 #include "import/source_mesh.h"
@@ -12,7 +13,7 @@ namespace farfield {
 inline constexpr uint32_t kMaxMaterials = 1u << 16;
 
 /// All instances of all meshes. `materials` of the result is left empty. Errors: InvalidArgument, naming mesh and
-/// element (farfield/bake.h has the rules); Unsupported (more than 2^32 - 1 corners).
-Result<SourceMesh> gather_mesh(const BakeInput& input);
+/// element (farfield/bake.h has the rules); Unsupported (more than 2^32 - 1 corners), Cancelled.
+Result<SourceMesh> gather_mesh(const BakeInput& input, const Job& job = {});
 
 }  // namespace farfield

@@ -83,10 +83,11 @@ uint64_t hash_of(const SourceMesh& mesh, const std::string& material_key) {
 
 }  // namespace
 
-Result<SourceMesh> source_from_input(const BakeInput& input) {
-  FARFIELD_TRY_LET(SourceMesh mesh, gather_mesh(input));
+Result<SourceMesh> source_from_input(const BakeInput& input, const Job& job) {
+  FARFIELD_TRY_LET(SourceMesh mesh, gather_mesh(input, job));
   const uint32_t highest = *std::max_element(mesh.face_material.begin(), mesh.face_material.end());
-  FARFIELD_TRY_LET(mesh.materials, gather_materials(input, size_t{highest} + 1));
+  FARFIELD_TRY_LET(mesh.materials, with_warnings(gather_materials(input, size_t{highest} + 1), mesh.warnings));
+  if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, "bake: cancelled");
   mesh.material_function = input.material_function;
   mesh.source_hash = hash_of(mesh, input.material_key);
   return mesh;

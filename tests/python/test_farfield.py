@@ -125,6 +125,14 @@ class Bake(InAFolder):
         with self.assertRaises(farfield.Error) as caught:
             farfield.info(self.folder / "none.farfield")
         self.assertEqual(caught.exception.code, "not found")
+        self.assertEqual(caught.exception.warnings, [])
+
+    def test_errors_have_the_warnings_that_came_before(self):
+        source = self.folder / "flat.obj"
+        source.write_text("mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+        with self.assertRaisesRegex(farfield.Error, "no face has any area") as caught:
+            farfield.bake_file(source, self.out)
+        self.assertEqual(caught.exception.warnings[0], "material library gone.mtl cannot be read")
 
     def test_tells_progress_and_ends_when_that_raises(self):
         seen = []
