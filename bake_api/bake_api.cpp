@@ -5,6 +5,7 @@
 #include <new>
 
 #include "bake/bake.h"
+#include "bake_api/gather_mesh.h"
 #include "bake_api/memory_guard.h"
 #include "bake_api/source_from_input.h"
 #include "base/bytes.h"
@@ -81,7 +82,7 @@ Result<BakeSummary> bake_meshes(const BakeInput& input, const std::string& folde
     FARFIELD_TRY_LET(SourceMesh mesh, source_from_input(input, options.job.quiet()));
     FARFIELD_TRY_LET(ImportedAsset asset, condition(std::move(mesh), input.name, options.job.quiet()));
     // What a function answers is not in the hash.
-    options.even_if_up_to_date = input.material_function && input.material_key.empty();
+    options.even_if_up_to_date = has_material_function(input) && input.material_key.empty();
     return bake(std::move(asset), input.name, folder, options);
   });
 }

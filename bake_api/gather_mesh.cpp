@@ -86,7 +86,7 @@ Result<void> check_materials(const BakeMesh& mesh, const MeshName& name, const B
     return name.error("{} material ids for {} faces; one for each, or none", mesh.materials.size(), faces);
   }
   // Faces of a mesh without ids have id 0.
-  const bool is_complete = !input.material_function && !input.materials.empty();
+  const bool is_complete = !has_material_function(input) && !input.materials.empty();
   const uint64_t limit = is_complete ? input.materials.size() : kMaxMaterials;
   for (size_t face = 0; face < mesh.materials.size() && !job.is_cancelled(); ++face) {
     if (whole_number(mesh.materials, face, limit)) continue;

@@ -254,6 +254,7 @@ Result<ImportedAsset> condition_mesh(SourceMesh& mesh, const std::string& name, 
   surface.positions = std::move(welded.positions);
   surface.materials = std::move(mesh.materials);
   surface.material_function = std::move(mesh.material_function);
+  surface.material_batch = std::move(mesh.material_batch);
   Triangulation(mesh, welded, surface).run(source_face, job);
   if (job.is_cancelled()) return cancelled();
   if (surface.triangles.empty()) {

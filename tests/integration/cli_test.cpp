@@ -453,6 +453,8 @@ TEST_F(WholeRoad, RenderAndShotOfAScene) {
     for (const char* key : {"frame", "seconds", "load_seconds", "accounted_bytes", "bias"})
       EXPECT_TRUE(frame.contains(key)) << key;
   EXPECT_LE(report["peak_accounted_bytes"], report["budget_bytes"]);
+  const std::string fingerprint = report["fingerprint"];
+  EXPECT_EQ(fingerprint.rfind("farfield ", 0), 0u) << "does not say which program rendered: " << fingerprint;
 
   render.insert(render.end(), {"--full-detail"});
   expect_quiet_success(farfield(render));

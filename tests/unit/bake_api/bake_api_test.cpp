@@ -225,6 +225,27 @@ TEST_F(BakeApi, StopsWhenTold) {
   EXPECT_FALSE(fs::exists(out()));
 }
 
+TEST_F(BakeApi, AFunctionThatTakesManyPlacesBakesTheSame) {
+  BakeInput input = tree_.input();
+  input.material_function = [](const MaterialQuery& query) {
+    MaterialSample sample;
+    sample.diffuse = {query.uv.x, 0.5f * query.uv.y, query.material == 1 ? 0.75f : 0.25f};
+    return sample;
+  };
+  ASSERT_TRUE(bake_meshes(input, out("one"), small_settings()));
+  std::atomic<size_t> most{0};
+  input.material_batch_function = [ask = input.material_function, &most](const MaterialQuery* queries,
+                                                                         MaterialSample* samples, size_t count) {
+    for (size_t i = 0; i < count; ++i) samples[i] = ask(queries[i]);
+    for (size_t seen = most; seen < count && !most.compare_exchange_weak(seen, count);) {
+    }
+  };
+  input.material_function = {};
+  ASSERT_TRUE(bake_meshes(input, out("many"), small_settings()));
+  EXPECT_GT(most, 1000u);
+  EXPECT_EQ(level_bytes(out("one")), level_bytes(out("many")));
+}
+
 TEST_F(BakeApi, HearsACancelBeforeItCopiesOrWelds) {
   std::atomic<bool> cancel{true};
   const Job job{{}, &cancel};
