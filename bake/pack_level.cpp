@@ -7,6 +7,7 @@
 #include <optional>
 #include <type_traits>
 
+#include "bake/pack_colors.h"
 #include "base/check.h"
 #include "base/index.h"
 #include "base/parallel.h"
@@ -240,9 +241,9 @@ void pack_surface(const Surface& surface, const SurfaceOrder& order, LevelData& 
     level.face_sggx =
         pack_each<PackedSurfaceSggx>(materials, [](const auto& m) { return pack_surface_sggx(seen_normals(m)); });
   }
-  level.face_diffuse = pack_each<PackedColor>(materials, [](const auto& m) { return pack_color(m.diffuse); });
-  level.face_specular = pack_each<PackedColor>(materials, [](const auto& m) { return pack_color(m.specular); });
-  level.face_transmission = pack_each<PackedColor>(materials, [](const auto& m) { return pack_color(m.transmission); });
+  level.face_diffuse = pack_colors(materials, [](const auto& m) { return m.diffuse; });
+  level.face_specular = pack_colors(materials, [](const auto& m) { return m.specular; });
+  level.face_transmission = pack_colors(materials, [](const auto& m) { return m.transmission; });
   drop_if_all(level.face_diffuse, PackedColor{});
   drop_if_all(level.face_specular, PackedColor{});
   drop_if_all(level.face_transmission, PackedColor{});
@@ -367,9 +368,9 @@ LevelData pack_volume(const SparseVolume& volume) {
   }
   const auto& voxels = volume.voxels;
   level.voxel_sggx = pack_each<PackedFlakeSggx>(voxels, [](const auto& v) { return pack_flake_sggx(v.sggx); });
-  level.voxel_diffuse = pack_each<PackedColor>(voxels, [](const auto& v) { return pack_color(v.diffuse); });
-  level.voxel_specular = pack_each<PackedColor>(voxels, [](const auto& v) { return pack_color(v.specular); });
-  level.voxel_transmission = pack_each<PackedColor>(voxels, [](const auto& v) { return pack_color(v.transmission); });
+  level.voxel_diffuse = pack_colors(voxels, [](const auto& v) { return v.diffuse; });
+  level.voxel_specular = pack_colors(voxels, [](const auto& v) { return v.specular; });
+  level.voxel_transmission = pack_colors(voxels, [](const auto& v) { return v.transmission; });
   level.voxel_self_shadowing =
       pack_each<uint8_t>(voxels, [](const auto& v) { return std::max<uint8_t>(pack_unorm8(v.self_shadowing), 1); });
   drop_if_all(level.voxel_sggx, pack_flake_sggx(SymMat3::identity()));

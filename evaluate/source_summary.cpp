@@ -22,7 +22,7 @@ struct MaterialSums {
     ++triangles;
     area += face_area;
     stopping_area += weight;
-    albedo += weight * dvec3(face.diffuse + face.specular);
+    albedo += weight * dvec3(face.specular + (1.0f - face.specular) * face.diffuse);
     transmission += weight * dvec3(face.transmission);
     emission += weight * dvec3(face.emission);
   }

@@ -46,7 +46,7 @@ struct SentOn {
 std::optional<SentOn> send_on(const LineScene& scene, const SeenLine& line, SplitMix& random) {
   const FaceMaterial& m = scene.geometry().materials[line.hit->triangle];
   const auto away = scattered_direction(m, line.hit->normal, line.direction, random);
-  const float weight = component_sum(m.diffuse + m.specular + m.transmission);
+  const float weight = component_sum(layered_albedo(m.specular, m.diffuse + m.transmission));
   if (!away || !(weight > 0)) return {};
   const auto size = static_cast<float>(scene.lattice().voxel_size);
   const float near = kClearance * size, far = kEscapeLength * size;
@@ -60,7 +60,7 @@ void let_escape(double ratio, Voxel& voxel) {
   const auto share = static_cast<float>(std::clamp(ratio, kLeastEscape, kMostEscape));
   voxel.self_shadowing = std::min(share, 1.0f);
   if (!(share > 1)) return;
-  const vec3 albedo = voxel.diffuse + voxel.specular + voxel.transmission;
+  const vec3 albedo = layered_albedo(voxel.specular, voxel.diffuse + voxel.transmission);
   const vec3 gain = cluster_albedo(glm::min(albedo, vec3(1.0f)), share) / glm::max(albedo, vec3(1e-6f));
   voxel.diffuse *= gain;
   voxel.specular *= gain;

@@ -13,6 +13,7 @@
 
 #include "runtime/close_up.h"
 #include "runtime/interaction_model.h"
+#include "scattering/albedo.h"
 #include "scattering/material_model.h"
 
 namespace farfield {
@@ -219,7 +220,7 @@ Interaction make_interaction(const TracedLevel& level, const InstanceRecord& ins
   if (hit.is_volume) {
     interaction.kind = Interaction::Kind::Volume;
     const FlakeParams params = flake_params(view, instance, hit.element);
-    interaction.albedo = params.diffuse + params.specular + params.transmission;
+    interaction.albedo = layered_albedo(params.specular, params.diffuse + params.transmission);
     interaction.emission = emission_at(view.voxel_emission, hit.element);
     InteractionModel::put(interaction, InteractionModel(FlakePhase(params, interaction.wo)));
     return interaction;
@@ -229,7 +230,7 @@ Interaction make_interaction(const TracedLevel& level, const InstanceRecord& ins
   const vec3 normal = glm::normalize(instance.normal_to_world(glm::normalize(normal_local)));
   interaction.geometric_normal = glm::dot(normal, interaction.wo) < 0.0f ? -normal : normal;
   const SurfaceParams params = shade_surface(level, instance, hit, direction, interaction);
-  interaction.albedo = params.diffuse + params.specular + params.transmission;
+  interaction.albedo = layered_albedo(params.specular, params.diffuse + params.transmission);
   InteractionModel::put(interaction,
                         InteractionModel(SurfaceBsdf(params, interaction.shading_normal, interaction.wo),
                                          ray_offset(instance, origin, interaction.position, view.header.bounds)));

@@ -21,6 +21,9 @@ inline void limit_sum(vec3& reflected, vec3& transmitted) {
   transmitted /= excess;
 }
 
+/// What comes back of light that meets a highlight over a base; linear RGB in [0, 1] if all are and the base's sum is.
+inline vec3 layered_albedo(const vec3& specular, const vec3& base) { return specular + (vec3(1.0f) - specular) * base; }
+
 /// The albedo of a cluster of scatterers of this albedo, when a share of what each scatters leaves the cluster and the
 /// rest meets another of them: the sum of share albedo ((1 - share) albedo)^n over n >= 0. albedo in [0, 1], share > 0.
 /// The result is 1 for white scatterers, about share * albedo for dark ones, and never above 1: the odds albedo / (1 -

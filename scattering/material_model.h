@@ -50,17 +50,19 @@ inline MapMeans means_without_maps(const MaterialFactors& material, float vertex
   return means;
 }
 
-/// `color`: the mean vertex colour, linear. What the specular lobe takes at normal incidence is left out of the diffuse
-/// one, so diffuse + transmission + specular <= 1 per channel.
+/// `color`: the mean vertex colour, linear. Diffuse and transmission are of the light that the specular lobe leaves
+/// (scattering/surface_bsdf.h), so their own sum is at most 1. Beside metal, which shares that lobe, the dielectric
+/// part keeps what glTF gives it.
 inline MaterialSample material_sample(const MaterialFactors& material, const MapMeans& means, const vec3& color) {
   const vec3 base = glm::clamp(material.base_color * color, vec3(0.0f), vec3(1.0f));
   MaterialSample out;
   out.specular = glm::clamp(material.dielectric_f0 * (1 - means.metallic) + base * means.metal, vec3(0.0f), vec3(1.0f));
-  const vec3 room = 1.0f - out.specular;
+  const vec3 left = glm::max(1.0f - out.specular, vec3(1e-6f));
+  const vec3 share = glm::clamp(1.0f - material.dielectric_f0, vec3(0.0f), vec3(1.0f)) / left;
   const float through = material.diffuse_transmission;
-  out.diffuse = glm::min(base * means.dielectric * (1 - through) * room, room);
+  out.diffuse = glm::min(base * means.dielectric * (1 - through) * share, vec3(1.0f));
   out.transmission =
-      glm::min(material.diffuse_transmission_color * (through * (1 - means.metallic)) * room, room - out.diffuse);
+      glm::min(material.diffuse_transmission_color * (through * (1 - means.metallic)) * share, 1.0f - out.diffuse);
   out.roughness = std::sqrt(std::sqrt(std::clamp(means.roughness2, 0.0f, 1.0f)));
   out.opacity = std::clamp(means.opacity, 0.0f, 1.0f);
   out.emission = glm::max(material.emission * means.emission, vec3(0.0f));
@@ -72,7 +74,6 @@ inline MaterialSample material_sample(const MaterialFactors& material, const Map
     const float pane = std::max(1 - (passes.x + passes.y + passes.z) / 3, 1e-3f);
     out.diffuse = glm::min(out.diffuse * ((1 - material.thin_transmission) / pane), vec3(1.0f));
     out.specular = glm::min(2.0f * out.specular / pane, vec3(1.0f));
-    out.diffuse = glm::min(out.diffuse, 1.0f - out.specular);
     out.opacity *= pane;
   }
   return out;

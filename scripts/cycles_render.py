@@ -3,7 +3,7 @@
 given camera, with materials that mean what glTF says.
 
 blender -b --factory-startup --python scripts/cycles_render.py -- JOB.json
-JOB: {"scene", "sky", "outputs": [[exr, seed], ...], "width", "height", "spp", "seconds",
+JOB: {"scene", "sky", "outputs": [[exr, seed], ...], "width", "height", "spp", "seconds", "added",
       "camera": {"position", "forward", "up", "pixel_spread", "pixel_width"}}, vectors in glTF's axes
 """
 import json
@@ -111,9 +111,29 @@ class Shader:
         return mixed.outputs[0]
 
 
-def rebuild(material, gltf):
+    def diffuse(self):
+        node = self.node("ShaderNodeBsdfDiffuse")
+        self.connect("Base Color", node.inputs["Color"])
+        self.connect("Normal", node.inputs["Normal"])
+        return node.outputs[0]
+
+    def highlight(self):
+        """The Principled node's, over black."""
+        for link in list(self.principled.inputs["Base Color"].links):
+            self.tree.links.remove(link)
+        self.principled.inputs["Base Color"].default_value = (0, 0, 0, 1)
+        return self.principled.outputs[0]
+
+    def add(self, a, b):
+        added = self.node("ShaderNodeAddShader")
+        self.tree.links.new(a, added.inputs[0])
+        self.tree.links.new(b, added.inputs[1])
+        return added.outputs[0]
+
+
+def rebuild(material, gltf, added):
     """What glTF says of dielectrics: a Lambertian base, transmission, which Blender 3.4 does not import, alpha. A highlight
-    stays as the importer has it, with the Principled node's own base below it."""
+    is added to the base, or stays as the importer has it, with the Principled node's own base below it."""
     shader = Shader(material)
     if not shader.principled:
         return
@@ -128,10 +148,9 @@ def rebuild(material, gltf):
         shader.tree.links.remove(link)
     alpha.default_value = 1
     if extensions.get("KHR_materials_specular", {}).get("specularFactor", 1.0) == 0:
-        diffuse = shader.node("ShaderNodeBsdfDiffuse")
-        shader.connect("Base Color", diffuse.inputs["Color"])
-        shader.connect("Normal", diffuse.inputs["Normal"])
-        result = diffuse.outputs[0]
+        result = shader.diffuse()
+    elif added:
+        result = shader.add(shader.diffuse(), shader.highlight())
     through = extensions.get("KHR_materials_diffuse_transmission", {})
     if through.get("diffuseTransmissionFactor", 0) > 0:
         translucent = shader.node("ShaderNodeBsdfTranslucent")
@@ -142,11 +161,11 @@ def rebuild(material, gltf):
     shader.tree.links.new(result, shader.output.inputs["Surface"])
 
 
-def rebuild_materials(document):
+def rebuild_materials(document, added):
     by_name = {m.get("name", ""): m for m in document.get("materials", [])}
     for material in bpy.data.materials:
         if material.use_nodes:
-            rebuild(material, by_name[material.name])
+            rebuild(material, by_name[material.name], added)
 
 
 def set_up_cycles(job):
@@ -155,7 +174,9 @@ def set_up_cycles(job):
     scene.render.resolution_x, scene.render.resolution_y = job["width"], job["height"]
     scene.render.resolution_percentage = 100
     scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_mode = "RGBA"
     scene.render.image_settings.color_depth = "32"
+    scene.render.film_transparent = True  # what is seen of the scene, without the sky behind it
     scene.render.image_settings.exr_codec = "ZIP"
     scene.render.use_persistent_data = True
     cycles = scene.cycles
@@ -177,7 +198,7 @@ def main():
     clear()
     bpy.ops.import_scene.gltf(filepath=job["scene"])
     remove_lights_and_cameras()
-    rebuild_materials(read_gltf_json(job["scene"]))
+    rebuild_materials(read_gltf_json(job["scene"]), job["added"])
     add_camera(job)
     add_sky(job["sky"])
     set_up_cycles(job)

@@ -38,7 +38,7 @@ class FARFIELD_API Interaction {
   uint32_t instance = kNoInstance;   ///< InstanceId of the hit
   uint32_t level = 0;                ///< k of the level that was hit
   float lambda = 0;                  ///< continuous level that the ray asked for
-  glm::vec3 albedo{0.0f};            ///< diffuse + specular + transmission, for AOVs and denoisers
+  glm::vec3 albedo{0.0f};            ///< of highlight and base together, for AOVs and denoisers
   glm::vec3 emission{0.0f};          ///< radiance that leaves the point along wo by itself
 
   // For a host that shades level 0 with its own materials; at coarser levels unknown: prefiltered faces have none.

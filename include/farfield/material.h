@@ -21,7 +21,7 @@ struct MaterialQuery {
 
 /// What is there. Linear RGB, albedos in [0, 1]; what lies outside is clamped, NaN is 0.
 struct MaterialSample {
-  glm::vec3 diffuse{0.8f};       ///< albedo of diffuse reflection
+  glm::vec3 diffuse{0.8f};       ///< albedo of diffuse reflection, of the light that the highlight leaves
   glm::vec3 specular{0.0f};      ///< reflectance at normal incidence (F0); 0: no highlight
   glm::vec3 transmission{0.0f};  ///< albedo of diffuse transmission; with `diffuse` above 1 both are scaled down
   float roughness = 1;           ///< of the highlight, perceptual as in glTF: GGX with alpha = roughness^2

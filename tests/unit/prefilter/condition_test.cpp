@@ -75,9 +75,9 @@ TEST(ImportObj, BlenderMaterialsMeanWhatBlenderMeans) {
       test::import_surface(folder.write("a.obj", std::string("mtllib m.mtl\nusemtl a\n") + kQuadObj + "f 1 2 3 4\n"));
   ASSERT_TRUE(asset) << asset.error().message;
   const FaceMaterial& m = first_material(asset);
-  expect_near(m.specular, vec3(0.04f));                       // 0.08 Ks
-  expect_near(m.diffuse, 0.96f * vec3(0.45f, 0.25f, 0.12f));  // what the highlight leaves
-  EXPECT_NEAR(m.roughness2, 0.0625, 1e-5);                    // roughness 0.5 = 1 - sqrt(250 / 1000)
+  expect_near(m.specular, vec3(0.04f));               // 0.08 Ks
+  expect_near(m.diffuse, vec3(0.45f, 0.25f, 0.12f));  // of what the highlight leaves
+  EXPECT_NEAR(m.roughness2, 0.0625, 1e-5);            // roughness 0.5 = 1 - sqrt(250 / 1000)
   EXPECT_TRUE(asset->warnings.empty());
 }
 
@@ -294,7 +294,8 @@ TEST(ImportGltf, MetallicRoughnessMapsToFaceMaterial) {
   ASSERT_TRUE(asset) << asset.error().message;
   const vec3 base(0.5f, 0.25f, 0.125f), f0 = 0.75f * vec3(0.04f) + 0.25f * base;
   expect_near(first_material(asset).specular, f0);
-  expect_near(first_material(asset).diffuse, 0.75f * base * (1.0f - f0));
+  // Over this base lies the highlight of the metal, too, which is not the dielectric part's.
+  expect_near(first_material(asset).diffuse, 0.75f * base * 0.96f / (1.0f - f0));
   EXPECT_NEAR(first_material(asset).roughness2, 0.0625, 1e-6);
 }
 
@@ -310,8 +311,8 @@ TEST(ImportGltf, SpecularIorAndDiffuseTransmissionExtensions) {
   const float f0 = std::pow(0.45f / 2.45f, 2.0f) * 0.5f;
   const FaceMaterial& m = first_material(asset);
   expect_near(m.specular, vec3(f0, 0.5f * f0, 0));
-  expect_near(m.diffuse, 0.75f * 0.5f * (1.0f - m.specular));
-  expect_near(m.transmission, 0.25f * vec3(1, 0.5f, 0) * (1.0f - m.specular));
+  expect_near(m.diffuse, vec3(0.75f * 0.5f));
+  expect_near(m.transmission, 0.25f * vec3(1, 0.5f, 0));
 }
 
 TEST(ImportGltf, WebpTexturesAndSpecularGlossinessAreRead) {
@@ -355,12 +356,12 @@ TEST(ImportGltf, TextureTransformMovesTheFootprint) {
   const auto left = test::import_surface(folder.write("l.glb", file(half(R"("scale":[0.5,1])"))));
   const auto right = test::import_surface(folder.write("r.glb", file(half(R"("scale":[0.5,1],"offset":[0.5,0])"))));
   ASSERT_TRUE(left && right);
-  expect_near(first_material(left).diffuse, vec3(0.96f, 0, 0), 1e-3f);
-  expect_near(first_material(right).diffuse, vec3(0, 0.96f, 0), 1e-3f);
+  expect_near(first_material(left).diffuse, vec3(1, 0, 0), 1e-3f);
+  expect_near(first_material(right).diffuse, vec3(0, 1, 0), 1e-3f);
   // A triangle over the whole image: three quarters of it lie on the left half.
   const auto whole = test::import_surface(folder.write("w.glb", file("")));
   ASSERT_TRUE(whole);
-  expect_near(first_material(whole).diffuse, 0.96f * vec3(0.75f, 0.25f, 0), 1e-3f);
+  expect_near(first_material(whole).diffuse, vec3(0.75f, 0.25f, 0), 1e-3f);
 }
 
 TEST(ImportGltf, VertexColoursAreLinearAndMultiply) {
@@ -372,7 +373,7 @@ TEST(ImportGltf, VertexColoursAreLinearAndMultiply) {
                     R"(,"COLOR_0":1)",
                     R"({"bufferView":1,"componentType":5121,"normalized":true,"count":3,"type":"VEC4"})", colors)));
   ASSERT_TRUE(asset) << asset.error().message;
-  expect_near(first_material(asset).diffuse, 0.96f * 0.5f * vec3(1, 128 / 255.0f, 0));
+  expect_near(first_material(asset).diffuse, 0.5f * vec3(1, 128 / 255.0f, 0));
 }
 
 TEST(ImportGltf, QuantizedPositionsAreDecoded) {

@@ -70,7 +70,7 @@ const Case kCases[] = {
     {"o05_alpha_in_map_kd", kLeaf, kMask, "cut out by the alpha in leaf_rgba.png"},
     {"o05_same_file_map_d", kLeaf, kMask, ""},
     {"o08_lower_map_kd", kHalves, 1, ""},
-    {"o09_pbr_maps", vec3(0.96f), 1, "map_Ks (line 9)"},
+    {"o09_pbr_maps", vec3(1.0f), 1, "map_Ks (line 9)"},
     {"o10_ks_half", kWood, 1, ""},
     {"o10_ks_illum0", kWood, 1, ""},
     {"o10_ks_one", kWood, 1, ""},
@@ -141,10 +141,10 @@ TEST(ImportTraits, AFileOfWhichNothingWouldBeLeftIsShown) {
 }
 
 TEST(ImportTraits, MetallicMapSwitchesTheDiffuseColourOff) {
-  // Red, 1 on the left half, is metal; the right half is white, less its highlight.
+  // Red, 1 on the left half, is metal; the right half is white under its highlight.
   const std::string material = "newmtl m\nKd 1 1 1\nPr 0.5\nmap_Pm -s 0.5 1 ";
   expect_diffuse(see_mtl(material + "my halves.png\n"), vec3(0.0f), "");
-  expect_diffuse(see_mtl(material + "-o 0.5 0 my halves.png\n"), vec3(0.96f), "");
+  expect_diffuse(see_mtl(material + "-o 0.5 0 my halves.png\n"), vec3(1.0f), "");
 }
 
 TEST(ImportTraits, TheLastOfTwoDefinitionsHolds) {
