@@ -221,8 +221,9 @@ Result<void> run(const char* source_file, const char* folder, const std::set<uin
       FARFIELD_TRY_LET(macrosurface, OpacityScene::build(surface));
     }
     const Comparison comparison{source, macrosurface ? &*macrosurface : nullptr, grid, volume};
-    Box3 bounds = file->view().header.bounds;
-    bounds.extend(source_bounds);
+    // The same pixels whatever voxels the level has at its border.
+    const Box3 bounds{source_bounds.lower - 1.5f * static_cast<float>(entry.resolution),
+                      source_bounds.upper + 1.5f * static_cast<float>(entry.resolution)};
     fmt::print("{:4}^3 {:7} triangles {:7} voxels", entry.grid, entry.triangles, entry.voxels);
     compare_lines(comparison, bounds, 2'000'000);
     compare_views(comparison, bounds, static_cast<float>(entry.resolution));
