@@ -168,7 +168,7 @@ uint64_t least_bytes(const VolumeSize& volume, const Surface& voxelized, const S
   if (any(&FaceMaterial::transmission)) per_voxel += sizeof(PackedColor);
   const uint64_t bytes =
       per_voxel * volume.voxels + sizeof(Brick) * volume.bricks + kTriangle * surface.triangles.size();
-  return bytes - bytes / 10;  // the estimate's own error
+  return bytes - bytes / 3;  // what long lines leave, and the estimate's own error
 }
 
 /// All vertices and stored voxels of a level.
@@ -338,6 +338,7 @@ class Baker {
     options_.job.report(share_done(level, 0.05), stage);
     const Stopwatch watch;
     const VolumeJob job{sub_resolution_,
+                        surface_,
                         {lattice_origin_, resolution},
                         {.rays_per_voxel = options_.rays_per_voxel,
                          .seed = level,
@@ -348,7 +349,11 @@ class Baker {
       return std::move(*stored);
     }
     if (level != last_level_) {  // the root is always wanted
-      FARFIELD_TRY_LET(const auto size, estimate_volume(job.geometry, job.lattice, job.options));
+      VoxelizeOptions estimate;
+      estimate.rays_per_voxel = options_.rays_per_voxel;
+      estimate.seed = level;
+      estimate.job = options_.job.quiet();
+      FARFIELD_TRY_LET(const auto size, estimate_volume(job.geometry, job.lattice, estimate));
       if (least_bytes(size, sub_resolution_, surface_) > most_bytes_worth_writing(level)) {
         level_report.worthless = true;
         level_report.triangles = surface_.triangles.size();
