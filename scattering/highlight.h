@@ -25,7 +25,8 @@ class Highlight {
   float alpha() const { return alpha_; }
   /// Of one facet, cos in [0, 1].
   vec3 fresnel(float cos) const;
-  /// From a table, absolute error below 0.004 (0.015 of what is nearly a mirror, within two degrees of grazing). cos: between direction and normal, clamped to [0, 1].
+  /// From a table, absolute error below 0.004 (0.015 of what is nearly a mirror, within two degrees of grazing). cos:
+  /// between direction and normal, clamped to [0, 1].
   HighlightShare share(float cos) const;
   /// Of light from there, all that comes back: directly, and over several facets.
   vec3 albedo(const HighlightShare& share) const {
