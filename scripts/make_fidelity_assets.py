@@ -4,20 +4,22 @@
 
 Usage: scripts/make_fidelity_assets.py FOLDER [NAME...]     without names: all
 """
+import json
 import math
 import random
+import struct
 import sys
 from pathlib import Path
 
 
 class Mesh:
-    """Vertices and faces by material; written as OBJ with an MTL beside."""
+    """Vertices and faces by material; written as .glb."""
 
     def __init__(self):
         self.points, self.faces = [], []
 
     def add(self, points, faces, material):
-        first = len(self.points) + 1
+        first = len(self.points)
         self.points += points
         self.faces += [(material, [first + i for i in face]) for face in faces]
 
@@ -56,19 +58,34 @@ class Mesh:
             self.quad(*((a, b, c, d) if s > 0 else (a, d, c, b)), material)
 
     def write(self, path, materials):
-        with open(path.with_suffix(".mtl"), "w") as out:
-            for name, lines in materials.items():
-                out.write("newmtl %s\n%s\n" % (name, lines))
-        with open(path, "w") as out:
-            out.write("mtllib %s\n" % path.with_suffix(".mtl").name)
-            for p in self.points:
-                out.write("v %.6g %.6g %.6g\n" % p)
-            last = None
-            for material, face in self.faces:
-                if material != last:
-                    out.write("usemtl %s\n" % material)
-                    last = material
-                out.write("f %s\n" % " ".join(map(str, face)))
+        names = sorted({material for material, _ in self.faces})
+        views, accessors, primitives, data = [], [], [], b""
+
+        def put(numbers, code, **accessor):
+            nonlocal data
+            packed = struct.pack("<%d%s" % (len(numbers), code), *numbers)
+            views.append({"buffer": 0, "byteOffset": len(data), "byteLength": len(packed)})
+            accessors.append({"bufferView": len(views) - 1, **accessor})
+            data += packed
+            return len(accessors) - 1
+
+        bounds = {"min": [min(p[k] for p in self.points) for k in range(3)],
+                  "max": [max(p[k] for p in self.points) for k in range(3)]}
+        positions = put([x for p in self.points for x in p], "f", componentType=5126, count=len(self.points), type="VEC3",
+                        **bounds)
+        for i, name in enumerate(names):
+            triangles = [corner for material, f in self.faces if material == name
+                         for k in range(1, len(f) - 1) for corner in (f[0], f[k], f[k + 1])]
+            indices = put(triangles, "I", componentType=5125, count=len(triangles), type="SCALAR")
+            primitives.append({"attributes": {"POSITION": positions}, "indices": indices, "material": i})
+        document = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+                    "meshes": [{"primitives": primitives}], "materials": [materials[name] for name in names],
+                    "extensionsUsed": ["KHR_materials_diffuse_transmission"], "bufferViews": views,
+                    "accessors": accessors, "buffers": [{"byteLength": len(data)}]}
+        text = json.dumps(document).encode()
+        text += b" " * (-len(text) % 4)
+        path.write_bytes(b"glTF" + struct.pack("<III", 2, 28 + len(text) + len(data), len(text)) + b"JSON" + text +
+                         struct.pack("<I", len(data)) + b"BIN\0" + data)
 
 
 def sub(a, b):
@@ -95,19 +112,21 @@ def direction(rng):
     return (r * math.cos(phi), r * math.sin(phi), z)
 
 
+def material(*color, metal=0.0, through=None):
+    """through: colour of the half of the light that goes through."""
+    result = {"doubleSided": True, "pbrMetallicRoughness": {"baseColorFactor": [*color, 1], "metallicFactor": metal,
+                                                            "roughnessFactor": 0.5}}
+    if through:
+        result["extensions"] = {"KHR_materials_diffuse_transmission": {"diffuseTransmissionFactor": 0.5,
+                                                                       "diffuseTransmissionColorFactor": through}}
+    return result
+
+
 MATERIALS = {
-    "wood": "Kd 0.42 0.28 0.16",
-    "clay": "Kd 0.55 0.25 0.16",
-    "steel": "Kd 0.05 0.05 0.05\nPr 0.5\nPm 1\nKs 0.5 0.5 0.5",
-    "hemp": "Kd 0.55 0.47 0.33",
-    "needle": "Kd 0.06 0.14 0.05",
-    "feather": "Kd 0.75 0.72 0.68",
-    "ivy": "Kd 0.09 0.2 0.05",
-    "wall": "Kd 0.5 0.45 0.4",
-    "hair": "Kd 0.35 0.22 0.12",
-    "bark": "Kd 0.2 0.14 0.09",
-    # Half of what a thin leaf does not absorb goes through.
-    "leaf": "Kd 0.1 0.2 0.04\nTf 0.12 0.25 0.05",
+    "wood": material(0.42, 0.28, 0.16), "clay": material(0.55, 0.25, 0.16), "steel": material(0.5, 0.5, 0.5, metal=1.0),
+    "hemp": material(0.55, 0.47, 0.33), "needle": material(0.06, 0.14, 0.05), "feather": material(0.75, 0.72, 0.68),
+    "ivy": material(0.09, 0.2, 0.05), "wall": material(0.5, 0.45, 0.4), "hair": material(0.35, 0.22, 0.12),
+    "bark": material(0.2, 0.14, 0.09), "leaf": material(0.2, 0.4, 0.08, through=[0.24, 0.5, 0.1]),
 }
 
 
@@ -248,9 +267,8 @@ def main():
     folder.mkdir(parents=True, exist_ok=True)
     for name in names:
         mesh = ASSETS[name]()
-        used = {material for material, _ in mesh.faces}
-        mesh.write(folder / (name + ".obj"), {n: lines for n, lines in MATERIALS.items() if n in used})
-        print("%s: %d faces" % (folder / (name + ".obj"), len(mesh.faces)))
+        mesh.write(folder / (name + ".glb"), MATERIALS)
+        print("%s: %d faces" % (folder / (name + ".glb"), len(mesh.faces)))
 
 
 main()

@@ -95,7 +95,7 @@ def main():
         run(ROOT / "scripts/make_fidelity_assets.py", generated, *names)
     assets = [(Path(file.rstrip("*")).name.replace(".gz", "").replace(".", "_"), file.endswith("*"), file.rstrip("*"))
               for file in options.files]
-    assets += [(name, False, generated / (name + ".obj")) for name in names]
+    assets += [(name, False, generated / (name + ".glb")) for name in names]
     results = []
     for name, is_tuned, source in assets:
         print(name, flush=True)
