@@ -476,8 +476,10 @@ Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeO
   }
   FARFIELD_TRY(check_replaceable(out));  // before the import, which may take minutes
   options.job.report(0, "import");
-  FARFIELD_TRY_LET(auto asset, import_asset(source, options.import));
-  asset.warnings = without_folder(std::move(asset.warnings), source.parent_path());
+  auto imported = import_asset(source, options.import, options.job.quiet());
+  std::vector<std::string>& warnings = imported ? imported->warnings : imported.error().warnings;
+  warnings = without_folder(std::move(warnings), source.parent_path());
+  FARFIELD_TRY_LET(auto asset, std::move(imported));
   const double import_seconds = watch.seconds();
   FARFIELD_TRY_LET(auto report, bake(std::move(asset), source.filename().string(), out, options));
   report.import_seconds = import_seconds;
@@ -501,8 +503,10 @@ Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, con
     report.total_seconds = watch.seconds();
     return report;
   }
-  FARFIELD_TRY_LET(auto workspace, BakeWorkspace::open(out));
-  FARFIELD_TRY_LET(auto baked, Baker(options, std::move(asset.source), std::move(workspace), std::move(report)).run());
+  FARFIELD_TRY_LET(auto workspace, with_warnings(BakeWorkspace::open(out), report.warnings));
+  const std::vector<std::string> warnings = report.warnings;
+  Baker baker(options, std::move(asset.source), std::move(workspace), std::move(report));
+  FARFIELD_TRY_LET(auto baked, with_warnings(baker.run(), warnings));
   baked.total_seconds = watch.seconds();
   return baked;
 }

@@ -43,7 +43,7 @@ struct LevelEvaluation {
 struct Evaluation {
   std::vector<LevelEvaluation> levels;  ///< finest first
   int views = 0;
-  std::vector<std::string> warnings;  ///< one line each
+  std::vector<std::string> warnings;  ///< one line each; those of the source's import first
 };
 
 /// Renders every chosen level and the source from the same views, under the same light, at one pixel per voxel of the
