@@ -18,17 +18,17 @@ constexpr double kNearby = 2;
 
 }  // namespace
 
-Result<LineScene> LineScene::build(const Surface& geometry, const Surface& macrosurface, const SparseVolume& volume) {
-  FARFIELD_TRY_LET(auto geometry_scene, OpacityScene::build(geometry));
-  LineScene scene(geometry, std::move(geometry_scene), volume);
+Result<LineScene> LineScene::build(const OpacityScene& geometry, const Surface& macrosurface,
+                                   const SparseVolume& volume) {
+  LineScene scene(geometry, volume);
   if (macrosurface.triangles.empty()) return scene;
   FARFIELD_TRY_LET(auto macrosurface_scene, OpacityScene::build(macrosurface));
   scene.add_macrosurface(std::move(macrosurface_scene), macrosurface.bounds());
   return scene;
 }
 
-LineScene::LineScene(const Surface& geometry, OpacityScene geometry_scene, const SparseVolume& volume)
-    : geometry_(&geometry), geometry_scene_(std::move(geometry_scene)), grid_(volume), lattice_(volume.lattice) {}
+LineScene::LineScene(const OpacityScene& geometry, const SparseVolume& volume)
+    : geometry_(&geometry), grid_(volume), lattice_(volume.lattice) {}
 
 void LineScene::add_macrosurface(OpacityScene scene, const Box3& bounds) {
   macrosurface_scene_ = std::move(scene);
@@ -54,7 +54,7 @@ SeenLine LineScene::cast(const VoxelRay& ray, SplitMix& random) const {
       line.ray.far = along_ray(ray, far);
     }
   }
-  line.hit = geometry_scene_.first_stop(line.origin, line.direction, far, random);
+  line.hit = geometry_->first_stop(line.origin, line.direction, far, random);
   if (line.hit) line.hit_at = along_ray(line.ray, line.hit->distance);
   return line;
 }

@@ -29,14 +29,14 @@ struct SeenLine {
   double seen_until() const { return hit ? hit_at : ray.far; }
 };
 
-/// Refers to the geometry. Immutable; any thread.
+/// Refers to the scene of the geometry. Immutable; any thread.
 class LineScene {
  public:
   /// `volume` is a voxelisation of `geometry`; only where its voxels are matters, and must stay. The macrosurface is
   /// what the level shows as it is. Errors: those of RayScene::build().
-  static Result<LineScene> build(const Surface& geometry, const Surface& macrosurface, const SparseVolume& volume);
+  static Result<LineScene> build(const OpacityScene& geometry, const Surface& macrosurface, const SparseVolume& volume);
 
-  const Surface& geometry() const { return *geometry_; }
+  const Surface& geometry() const { return geometry_->surface(); }
   const VoxelGrid& grid() const { return grid_; }
   const VoxelLattice& lattice() const { return lattice_; }
 
@@ -47,7 +47,7 @@ class LineScene {
 
   bool is_stopped_by_geometry(const vec3& origin, const vec3& direction, float near, float far,
                               SplitMix& random) const {
-    return geometry_scene_.is_stopped(origin, direction, near, far, random);
+    return geometry_->is_stopped(origin, direction, near, far, random);
   }
   bool is_stopped_by_macrosurface(const vec3& origin, const vec3& direction, float near, float far,
                                   SplitMix& random) const {
@@ -55,12 +55,11 @@ class LineScene {
   }
 
  private:
-  LineScene(const Surface& geometry, OpacityScene geometry_scene, const SparseVolume& volume);
+  LineScene(const OpacityScene& geometry, const SparseVolume& volume);
   void add_macrosurface(OpacityScene scene, const Box3& bounds);
   double along_ray(const VoxelRay& ray, float distance) const;
 
-  const Surface* geometry_;
-  OpacityScene geometry_scene_;
+  const OpacityScene* geometry_;
   std::optional<OpacityScene> macrosurface_scene_;
   VoxelGrid grid_;
   VoxelLattice lattice_;

@@ -12,7 +12,7 @@
 namespace farfield {
 
 struct VolumeOptions {
-  uint32_t rays_per_voxel = 200;  ///< > 0
+  uint32_t rays_per_voxel = 200;  ///< > 0: half of them for the voxel alone, the rest in about four steps
   uint64_t seed = 0;
   Job job{};  ///< reports from the calling thread alone
 };

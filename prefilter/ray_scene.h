@@ -42,6 +42,8 @@ class OpacityScene {
   /// Errors: those of RayScene::build().
   static Result<OpacityScene> build(const Surface& geometry);
 
+  const Surface& surface() const { return *geometry_; }
+
   /// The first face that stops the ray. `random` is used only where faces are not opaque.
   std::optional<RayHit> first_stop(const vec3& origin, const vec3& direction, float far, SplitMix& random) const;
   /// Whether any face between these distances stops it.

@@ -34,7 +34,7 @@ constexpr double kMostMatch = 1.5;  ///< a pass changes a density by no larger f
 constexpr double kMostWhole = 2;
 
 /// All lines, as a multiple of options.lines, for the progress.
-constexpr double kAllLines = 3.25;
+constexpr double kAllLines = 2.75;
 
 class DensityMatcher {
  public:
@@ -46,7 +46,7 @@ class DensityMatcher {
     for (uint64_t i = 0; i < kMatchPasses; ++i) FARFIELD_TRY(match_voxels(pass(1 + i, 1.0 / kMatchPasses)));
     // Only the last of these must be exact.
     FARFIELD_TRY(match_whole(pass(kMatchPasses + 1, 0.25)));
-    FARFIELD_TRY(match_whole(pass(kMatchPasses + 2, 1)));
+    FARFIELD_TRY(match_whole(pass(kMatchPasses + 2, 0.5)));
     return {};
   }
 

@@ -197,13 +197,12 @@ VoxelSet find_candidates(const Surface& geometry, const VoxelLattice& lattice) {
 }
 
 /// The kept voxels of every stride-th candidate brick of the range; the masks of these bricks become theirs.
-Result<std::vector<std::vector<Voxel>>> measure_bricks(const Surface& geometry, const VoxelLattice& lattice,
+Result<std::vector<std::vector<Voxel>>> measure_bricks(const OpacityScene& geometry, const VoxelLattice& lattice,
                                                        VoxelSet& candidates, size_t stride,
                                                        const VoxelizeOptions& options) {
   std::vector<std::vector<Voxel>> voxels(candidates.coordinates.size());
-  if (voxels.empty()) return voxels;
-  FARFIELD_TRY_LET(const OpacityScene rays, OpacityScene::build(geometry));
-  const Measurement measurement{geometry, lattice, rays, rays_per_voxel(candidates.size(), options), options.seed};
+  const Measurement measurement{geometry.surface(), lattice, geometry, rays_per_voxel(candidates.size(), options),
+                                options.seed};
   const size_t first = std::min<uint64_t>(options.bricks.first, voxels.size());
   const size_t last = first + std::min<uint64_t>(options.bricks.count, voxels.size() - first);
   const size_t count = (last - first + stride - 1) / stride;
@@ -228,9 +227,17 @@ Result<std::vector<std::vector<Voxel>>> measure_bricks(const Surface& geometry, 
 
 Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options) {
   FARFIELD_TRY(check_arguments(geometry, lattice, options));
+  if (geometry.triangles.empty()) return SparseVolume{lattice, {}, {}};
+  FARFIELD_TRY_LET(const auto scene, OpacityScene::build(geometry));
+  return voxelize(scene, lattice, options);
+}
+
+Result<SparseVolume> voxelize(const OpacityScene& geometry, const VoxelLattice& lattice,
+                              const VoxelizeOptions& options) {
+  FARFIELD_TRY(check_arguments(geometry.surface(), lattice, options));
   SparseVolume volume;
   volume.lattice = lattice;
-  VoxelSet candidates = find_candidates(geometry, lattice);
+  VoxelSet candidates = find_candidates(geometry.surface(), lattice);
   FARFIELD_TRY_LET(auto voxels, measure_bricks(geometry, lattice, candidates, 1, options));
   for (size_t i = 0; i < voxels.size(); ++i) {
     std::vector<Voxel>& of_brick = voxels[i];
@@ -256,7 +263,8 @@ Result<VolumeSize> estimate_volume(const Surface& geometry, const VoxelLattice& 
   VoxelizeOptions quietly = options;
   quietly.job = options.job.quiet();
   quietly.bricks = {};
-  FARFIELD_TRY_LET(const auto voxels, measure_bricks(geometry, lattice, candidates, kStride, quietly));
+  FARFIELD_TRY_LET(const auto scene, OpacityScene::build(geometry));
+  FARFIELD_TRY_LET(const auto voxels, measure_bricks(scene, lattice, candidates, kStride, quietly));
   double kept = 0;
   for (const std::vector<Voxel>& of_brick : voxels) {
     double kept_in_brick = 0;

@@ -9,6 +9,7 @@
 #include "base/job.h"
 #include "base/result.h"
 #include "base/vec.h"
+#include "prefilter/ray_scene.h"
 #include "prefilter/surface.h"
 #include "prefilter/voxel_marks.h"
 #include "scattering/sym_mat3.h"
@@ -63,6 +64,10 @@ struct VoxelizeOptions {
 /// volume. The result does not depend on the number of threads. Errors: Cancelled; InvalidArgument (options, or
 /// geometry further than about a million voxels from the origin); Io (out of memory in Embree).
 Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options);
+
+/// The same for a surface whose scene is there already.
+Result<SparseVolume> voxelize(const OpacityScene& geometry, const VoxelLattice& lattice,
+                              const VoxelizeOptions& options);
 
 /// The number of bricks that voxelize() looks at, some of which turn out empty. Fast: no ray is cast.
 uint64_t candidate_bricks(const Surface& geometry, const VoxelLattice& lattice);
