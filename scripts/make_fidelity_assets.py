@@ -271,4 +271,5 @@ def main():
         print("%s: %d faces" % (folder / (name + ".glb"), len(mesh.faces)))
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bakes assets 512^3 to 8^3, evaluates every level under every light, and writes docs/results/fidelity.md.
 
-Usage: scripts/measure_fidelity.py FOLDER [--views N] [--only NAME...] [FILE[*]...]
+Usage: scripts/measure_fidelity.py FOLDER [--views N] [--only NAME...] [--bake-only] [FILE[*]...]
 
 FILE: an asset beside the generated ones (scripts/make_fidelity_assets.py); with * behind it, one that was looked at while
-tuning. What FOLDER has already is not done again: delete an asset's .json for that. Needs the release build.
+tuning. What FOLDER has already is not done again: delete an asset's .cpu or .json for that. Needs the release build.
 """
 import argparse
 import json
@@ -31,16 +31,20 @@ def cpu_seconds(*command):
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def measure(name, source, folder, views):
+def bake(name, source, folder):
+    """CPU seconds."""
+    seconds = folder / (name + ".cpu")
+    if not seconds.exists():
+        seconds.write_text("%f" % cpu_seconds(FARFIELD, "bake", source, "-o", folder / (name + ".farfield")))
+    return float(seconds.read_text())
+
+
+def evaluate(name, source, folder, views):
     result = folder / (name + ".json")
     if not result.exists():
-        asset = folder / (name + ".farfield")
-        seconds = cpu_seconds(FARFIELD, "bake", source, "-o", asset, "--report", folder / (name + ".bake.json"))
-        run(FARFIELD, "evaluate", asset, "--source", source, "--views", views, "--json", folder / (name + ".evaluate.json"),
-            "--sheet", folder / (name + ".png"))
-        figures = json.loads((folder / (name + ".evaluate.json")).read_text())
-        figures["bake_cpu_seconds"] = seconds
-        result.write_text(json.dumps(figures))
+        run(FARFIELD, "evaluate", folder / (name + ".farfield"), "--source", source, "--views", views, "--json",
+            result.with_suffix(".part"), "--sheet", folder / (name + ".png"))
+        result.with_suffix(".part").rename(result)
     return json.loads(result.read_text())
 
 
@@ -88,7 +92,8 @@ def main():
     parser.add_argument("files", nargs="*")
     parser.add_argument("--views", type=int, default=6)
     parser.add_argument("--only", nargs="*", help="of the generated assets")
-    options = parser.parse_args()
+    parser.add_argument("--bake-only", action="store_true")
+    options = parser.parse_intermixed_args()
     names = list(make_fidelity_assets.ASSETS) if options.only is None else options.only
     generated = options.folder / "generated"
     if names:
@@ -99,10 +104,18 @@ def main():
     results = []
     for name, is_tuned, source in assets:
         print(name, flush=True)
-        results.append((name, is_tuned, measure(name, source, options.folder, options.views)))
+        seconds = bake(name, source, options.folder)
+        if not options.bake_only:
+            figures = evaluate(name, source, options.folder, options.views)
+            results.append((name, is_tuned, {**figures, "bake_cpu_seconds": seconds}))
+    if not options.bake_only:
+        write_page(results, options.views)
+
+
+def write_page(results, views):
     lines = ["# How alike levels look", "",
              "Made by `scripts/measure_fidelity.py FOLDER FILES...` with %d views. Coverage: occlusion error of the level, %% of what"
-             " the source covers;" % options.views,
+             " the source covers;" % views,
              "then its rms per pixel, and over touched pixels. Under each light the mean colour's bias, %, of the channel that is"
              " farthest off", "(`docs/error_metric.md`); ?: lost in noise. Untouched: not looked at while tuning (decisions 0012, 0013).",
              ""]
@@ -112,4 +125,5 @@ def main():
     (ROOT / "docs/results/fidelity.md").write_text("\n".join(lines))
 
 
-main()
+if __name__ == "__main__":
+    main()
