@@ -44,6 +44,13 @@ std::string printable(std::string_view text) {
   return text.size() > kLongest ? line + "..." : line;
 }
 
+bool are_finite(const LevelErrors& errors) {
+  bool finite = std::isfinite(errors.occlusion_error);
+  for (const ErrorSize& size : {errors.occlusion_rms, errors.color_error})
+    finite = finite && std::isfinite(size.value.value_or(0.0)) && std::isfinite(size.low) && std::isfinite(size.high);
+  return finite;
+}
+
 Problem find_level_problem(const LevelEntry& level) {
   if (level.level >= kMaxLevels) return fmt::format("level numbers end at {}", kMaxLevels - 1);
   if (!std::isfinite(level.resolution) || !(level.resolution > 0)) return "its resolution is not positive";
@@ -57,9 +64,7 @@ Problem find_level_problem(const LevelEntry& level) {
     if (count > kMaxElements) return fmt::format("{} elements are more than any level has", count);
   }
   if (level.errors) {
-    for (const double e : {level.errors->occlusion_error, level.errors->occlusion_rms, level.errors->color_error}) {
-      if (!std::isfinite(e)) return "its errors are not finite";
-    }
+    if (!are_finite(*level.errors)) return "its errors are not finite";
   }
   return {};
 }
@@ -124,11 +129,23 @@ int nesting_depth(std::string_view text) {
   return deepest;
 }
 
+/// A number, or null where noise hides it: then the bounds stand beside it.
+ErrorSize error_size_from_json(const Json& json, const std::string& name, const std::string& where, FieldReader& read) {
+  const Json* value = read.field(json, name.c_str(), where);
+  if (value == nullptr) return {};
+  if (!value->is_null()) return read.number(json, name.c_str(), where);
+  const std::string bounds_name = name + "_bounds";
+  const Json* bounds = read.field(json, bounds_name.c_str(), where);
+  if (bounds == nullptr) return {};
+  const double low = read.number(*bounds, "low", where + "." + bounds_name);
+  return ErrorSize::unknown(low, read.number(*bounds, "high", where + "." + bounds_name));
+}
+
 LevelErrors errors_from_json(const Json& json, const std::string& where, FieldReader& read) {
   LevelErrors errors;
   errors.occlusion_error = read.number(json, "occlusion_error", where);
-  errors.occlusion_rms = read.number(json, "occlusion_rms", where);
-  errors.color_error = read.number(json, "color_error", where);
+  errors.occlusion_rms = error_size_from_json(json, "occlusion_rms", where, read);
+  errors.color_error = error_size_from_json(json, "color_error", where, read);
   return errors;
 }
 
@@ -208,6 +225,11 @@ OrderedJson to_json(const std::vector<HashedFile>& files) {
   return json;
 }
 
+void add_error_size(OrderedJson& json, const std::string& name, const ErrorSize& size) {
+  json[name] = size.value ? OrderedJson(*size.value) : OrderedJson();
+  if (!size.value) json[name + "_bounds"] = {{"low", size.low}, {"high", size.high}};
+}
+
 OrderedJson to_json(const LevelEntry& level) {
   OrderedJson json = {{"level", level.level},
                       {"resolution", level.resolution},
@@ -221,9 +243,10 @@ OrderedJson to_json(const LevelEntry& level) {
                       {"resident_bytes", level.resident_bytes},
                       {"build_peak_bytes", level.build_peak_bytes}};
   if (level.errors) {
-    json["errors"] = {{"occlusion_error", level.errors->occlusion_error},
-                      {"occlusion_rms", level.errors->occlusion_rms},
-                      {"color_error", level.errors->color_error}};
+    OrderedJson errors = {{"occlusion_error", level.errors->occlusion_error}};
+    add_error_size(errors, "occlusion_rms", level.errors->occlusion_rms);
+    add_error_size(errors, "color_error", level.errors->color_error);
+    json["errors"] = errors;
   }
   return json;
 }

@@ -19,11 +19,25 @@ namespace farfield {
 inline constexpr int kFormatVersion = 2;  ///< 1 had neither materials nor textures
 inline constexpr const char* kManifestName = "manifest.json";
 
-/// Errors of a level as docs/error_metric.md defines them, signed fractions; absent until `farfield evaluate` has run.
+/// The size of an error, >= 0; where noise hides it, what it lies between.
+struct ErrorSize {
+  std::optional<double> value;
+  double low = 0, high = 0;  ///< bounds; the value itself if it is known
+
+  ErrorSize() = default;
+  ErrorSize(double known) : value(known), low(known), high(known) {}  // NOLINT: a number is one that is known
+  static ErrorSize unknown(double low, double high) {
+    ErrorSize size;
+    size.low = low, size.high = high;
+    return size;
+  }
+};
+
+/// Errors of a level as docs/error_metric.md defines them, fractions; absent until `farfield evaluate` has run.
 struct LevelErrors {
-  double occlusion_error = 0;
-  double occlusion_rms = 0;
-  double color_error = 0;
+  double occlusion_error = 0;  ///< signed
+  ErrorSize occlusion_rms;
+  ErrorSize color_error;
 };
 
 /// One level's row of the manifest.

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "path_tracer/asset_view.h"
 
+#include <limits>
+
 #include "base/embree.h"
+#include "base/hash.h"
 #include "base/parallel.h"
+#include "base/random.h"
 #include "base/result.h"
 #include "path_tracer/camera.h"
 
@@ -63,6 +67,22 @@ Result<ViewImages> AssetView::render(const ViewOptions& options, const Lights& l
   const TraceScene scene{impl_->scene.get(), impl_->runtime.get(), &lights};
   FARFIELD_TRY(path_trace(scene, camera, trace, film, job));
   return ViewImages{select_channels(film.image(), {"R", "G", "B", "A"}), {film.half(0), film.half(1)}};
+}
+
+std::vector<float> AssetView::first_hits(std::span<const ProbeRay> rays, uint64_t seed) const {
+  constexpr size_t kGrain = 1024;
+  std::vector<float> distances(rays.size(), std::numeric_limits<float>::infinity());
+  parallel_for(rays.size(), kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      Rng rng(mix64(seed, i));
+      RayContext context;
+      context.path_seed = rng.next_uint();
+      context.ray_seed = rng.next_uint();
+      EmbreeRayHit ray_hit = make_ray_hit(rays[i].origin, rays[i].direction);
+      if (trace_nearest(impl_->scene.get(), context.embree, ray_hit)) distances[i] = ray_hit.ray.tfar;
+    }
+  });
+  return distances;
 }
 
 }  // namespace farfield

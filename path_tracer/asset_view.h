@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "base/result.h"
 #include "base/vec.h"
@@ -34,6 +36,12 @@ struct ViewImages {
   Image half[2];
 };
 
+/// A ray in the asset's space; direction: unit.
+struct ProbeRay {
+  vec3 origin{0.0f};
+  vec3 direction{0.0f};
+};
+
 /// A baked asset with all rays at one lambda. One thread at a time; render() itself uses all threads.
 class AssetView {
  public:
@@ -50,6 +58,8 @@ class AssetView {
   Stats stats() const;
   /// Errors: those of path_trace.
   Result<ViewImages> render(const ViewOptions& options, const Lights& lights, const Job& job = {}) const;
+  /// How far each ray goes until it meets the asset; infinity where it does not. Depends on the arguments alone.
+  std::vector<float> first_hits(std::span<const ProbeRay> rays, uint64_t seed) const;
 
  private:
   AssetView();

@@ -5,6 +5,7 @@
 
 #include "cache/manifest.h"
 #include "evaluate/evaluate.h"
+#include "evaluate/evaluation_json.h"
 #include "python/bake.h"
 #include "python/long_call.h"
 #include "python/materials.h"
@@ -45,6 +46,7 @@ std::string evaluate_asset(const std::string& folder, const std::string& source,
   options.other_source = fields["other_source"].cast<bool>();
   options.first_level = fields["first_level"].cast<uint32_t>();
   options.last_level = fields["last_level"].cast<uint32_t>();
+  options.lights = value_or_raise(parse_lights(fields["lights"].cast<std::string>()));
   options.views = fields["views"].cast<int>();
   options.samples_per_pixel = fields["samples"].cast<int>();
   options.seed = fields["seed"].cast<uint64_t>();

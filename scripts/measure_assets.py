@@ -13,10 +13,15 @@ def percent(x, digits=2):
     return "-" if x is None else "%+.*f %%" % (digits, 100 * x)
 
 
-def color_error(level):
-    if level["color_error_low"] > 0:
-        return percent(level["color_error"])
-    return "lost in noise (with it %.0f %%)" % (100 * level["color_error_raw"])
+def size(figures, name):
+    """An error's size; where noise hides it, its bounds."""
+    if figures[name] is not None:
+        return "%.2f %%" % (100 * figures[name])
+    return "unknown, %.2f to %.2f %%" % tuple(100 * bound for bound in figures["bounds"][name])
+
+
+def bias(figures):
+    return ", ".join(percent(b, 1) for b in figures["color_bias"])
 
 
 def table(folder, name):
@@ -31,9 +36,15 @@ def table(folder, name):
         thesis = THESIS.get(level["grid"])
         print("| %d | %d | %d | %.0f | %.0f | %s | %s | %s | %s | %s |" % (
             level["grid"], level["triangles"], level["voxels"], level["bytes_disk"] / 1024,
-            level["bytes_resident"] / 1024, percent(level["occlusion_error"]), percent(level["occlusion_rms"]),
-            color_error(level), ", ".join(percent(b, 1) for b in level["color_bias"]),
+            level["bytes_resident"] / 1024, percent(level["occlusion_error"]), size(level, "occlusion_rms"),
+            size(level, "color_error"), bias(level),
             ", ".join("%+.2f" % t for t in thesis) if thesis else "-"))
+    print("\n| grid | light | bias r, g, b | worst view, bias r, g, b | colour error | rms | 2x2 | 4x4 |\n" + "|---" * 8 + "|")
+    for level in evaluated["levels"]:
+        for light in level["lights"]:
+            print("| %d | %s | %s | %d: %s | %s |" % (
+                level["grid"], light["light"], bias(light), light["worst_view"]["view"], bias(light["worst_view"]),
+                " | ".join(size(light, name) for name in ("color_error", "color_rms", "color_rms_2x2", "color_rms_4x4"))))
     print("\n![source, level, difference](%s.png)\n" % name)
 
 

@@ -70,7 +70,7 @@ def level_table(folder, name):
     for level in json.load(open(f"{folder}/{name}.evaluate.json"))["levels"]:
         print("| %d | %d | %d | %.0f | %s | %s | %s |" % (
             level["grid"], level["triangles"], level["voxels"], level["bytes_resident"] / 1024, percent(level["occlusion_error"], 2),
-            percent(level["color_error"]) if level["color_error_low"] > 0 else "lost in noise", ", ".join(percent(b) for b in level["color_bias"])))
+            "unknown" if level["color_error"] is None else percent(level["color_error"]), ", ".join(percent(b) for b in level["color_bias"])))
     print()
 
 

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "base/parallel.h"
 #include "base/result.h"
 #include "evaluate/evaluate.h"
+#include "evaluate/evaluation_json.h"
+#include "evaluate/figure_text.h"
 #include "tools/args.h"
 #include "tools/commands.h"
 #include "tools/console.h"
@@ -23,24 +27,48 @@ struct EvaluateArguments {
   bool writes_files() const { return !json.empty() || !sheet.empty() || !images.empty(); }
 };
 
-std::string with_error(const Estimate& estimate, bool is_signed) {
-  return is_signed ? fmt::format("{:+.2f} +- {:.2f} %", 100 * estimate.value, 100 * estimate.standard_error)
-                   : fmt::format("{:.2f} +- {:.2f} %", 100 * estimate.value, 100 * estimate.standard_error);
+std::string bias_text(const std::array<Estimate, 3>& bias) {
+  double deviation = 0;
+  for (const Estimate& channel : bias) deviation = std::max(deviation, channel.standard_error);
+  return fmt::format("{:+.2f} {:+.2f} {:+.2f} +- {:.2f} %", 100 * bias[0].value, 100 * bias[1].value,
+                     100 * bias[2].value, 100 * deviation);
 }
 
-std::string evaluation_table(const Evaluation& evaluation) {
-  std::vector<std::vector<std::string>> rows = {
-      {"level", "grid", "occlusion", "rms", "color", "bias red", "bias green", "bias blue", "noise", "spp"}};
+/// Coverage and depth: one row per level.
+std::string shape_table(const Evaluation& evaluation) {
+  std::vector<std::vector<std::string>> rows = {{"level", "grid", "occlusion", "worst view", "rms", "touched", "2x2",
+                                                 "4x4", "depth", "depth moved", "inside hits", "spp"}};
   for (const LevelEvaluation& level : evaluation.levels) {
     const ErrorMetrics& e = level.errors;
+    const Estimate& worst = level.views[level.worst_view].occlusion_error;
     rows.push_back({fmt::format("{}", level.entry.level), fmt::format("{}^3", level.entry.grid),
-                    with_error(e.occlusion_error, true), with_error(e.occlusion_rms, false),
-                    e.color_error_low > 0 ? with_error(e.color_error, false) : "lost in noise: raise --spp",
-                    with_error(e.color_bias[0], true), with_error(e.color_bias[1], true),
-                    with_error(e.color_bias[2], true), fmt::format("{:.2f} %", 100 * e.color_noise),
-                    fmt::format("{}", level.samples_per_pixel)});
+                    estimate_text(e.occlusion_error), fmt::format("{}: {:+.2f} %", level.worst_view, 100 * worst.value),
+                    size_text(e.occlusion_rms), size_text(e.occlusion_rms_touched[0]),
+                    size_text(e.occlusion_rms_touched[1]), size_text(e.occlusion_rms_touched[2]),
+                    estimate_text(level.depth.camera.mean), size_text(level.depth.camera.distance),
+                    estimate_text(level.depth.inside_hits), fmt::format("{}", level.samples_per_pixel)});
   }
   return format_table(rows);
+}
+
+/// Colour: one row per level and light.
+std::string color_table(const Evaluation& evaluation) {
+  std::vector<std::vector<std::string>> rows = {
+      {"level", "grid", "light", "occlusion", "bias red, green, blue", "worst view", "color", "rms", "2x2", "4x4"}};
+  for (const LevelEvaluation& level : evaluation.levels)
+    for (const LightEvaluation& light : level.lights) {
+      const ErrorMetrics& e = light.errors;
+      const Estimate worst = light.views[light.worst_view].largest_color_bias();
+      rows.push_back({fmt::format("{}", level.entry.level), fmt::format("{}^3", level.entry.grid),
+                      std::string(name_of(light.light)), estimate_text(e.occlusion_error), bias_text(e.color_bias),
+                      fmt::format("{}: {:+.2f} %", light.worst_view, 100 * worst.value), size_text(e.color_error),
+                      size_text(e.color_rms[0]), size_text(e.color_rms[1]), size_text(e.color_rms[2])});
+    }
+  return format_table(rows);
+}
+
+std::string evaluation_tables(const Evaluation& evaluation) {
+  return shape_table(evaluation) + "\n" + color_table(evaluation);
 }
 
 Result<void> run_evaluate(EvaluateArguments& arguments) {
@@ -62,7 +90,7 @@ Result<void> run_evaluate(EvaluateArguments& arguments) {
   progress.clear();
   if (!evaluation) return tl::unexpected(evaluation.error());
   print_warnings("evaluate", evaluation->warnings);
-  if (stdout_is_terminal() || !arguments.writes_files()) fmt::print("{}", evaluation_table(*evaluation));
+  if (stdout_is_terminal() || !arguments.writes_files()) fmt::print("{}", evaluation_tables(*evaluation));
   return arguments.json.empty() ? Result<void>() : write_text_file(arguments.json, to_json(*evaluation));
 }
 
@@ -82,12 +110,14 @@ void add_evaluate_command(CLI::App& app, Action& action) {
                     "Compare with a model that it was not baked from, too; then no errors are kept");
   add_parsed_option(command, "--levels", arguments->levels, parse_level_range,
                     "Levels A-B; without it all but the source");
-  command->add_option("--views", options.views, "Pictures per level")
+  add_parsed_option(command, "--lights", options.lights, parse_lights,
+                    "Of daylight,front,behind,above,sky; without it all. Only daylight's colour is kept in the asset");
+  command->add_option("--views", options.views, "Pictures per level and light")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   command
       ->add_option("--spp", options.samples_per_pixel,
-                   "Samples per pixel, rounded up to four; without it more for smaller pictures")
+                   "Samples per pixel and light, rounded up to four; without it more for smaller pictures")
       ->check(CLI::Range(1, 1 << 20));
   command->add_option("--seed", options.seed, "Of the random numbers");
   command->add_option("--threads", arguments->threads, "0: as many as the machine has")

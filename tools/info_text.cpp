@@ -9,6 +9,7 @@
 
 #include "base/bytes.h"
 #include "base/hash.h"
+#include "evaluate/figure_text.h"
 #include "tools/console.h"
 
 namespace farfield::tool {
@@ -26,8 +27,8 @@ std::vector<std::string> level_row(const Manifest& manifest, const LevelEntry& l
       format_bytes(level.file_bytes),  format_bytes(level.resident_bytes)};
   if (level.errors) {
     row.push_back(percent(level.errors->occlusion_error, "{:+.2f} %"));
-    row.push_back(percent(level.errors->occlusion_rms, "{:.2f} %"));
-    row.push_back(percent(level.errors->color_error, "{:.2f} %"));
+    row.push_back(size_text(level.errors->occlusion_rms));
+    row.push_back(size_text(level.errors->color_error));
   } else {
     row.insert(row.end(), 3, "-");
   }
@@ -35,6 +36,12 @@ std::vector<std::string> level_row(const Manifest& manifest, const LevelEntry& l
 }
 
 Json vector_json(const auto& v) { return {v.x, v.y, v.z}; }
+
+/// null where noise hides it; the bounds as `farfield evaluate --json` has them.
+void put_size(Json& json, const std::string& name, const ErrorSize& size) {
+  json[name] = size.value ? Json(*size.value) : Json();
+  if (!size.value) json["bounds"][name] = {size.low, size.high};
+}
 
 Json level_json(const Manifest& manifest, const LevelEntry& level) {
   Json json = {{"level", level.level},
@@ -51,8 +58,8 @@ Json level_json(const Manifest& manifest, const LevelEntry& level) {
                {"file_hash", to_hex(level.file_hash)}};
   if (level.errors) {
     json["occlusion_error"] = level.errors->occlusion_error;
-    json["occlusion_rms"] = level.errors->occlusion_rms;
-    json["color_error"] = level.errors->color_error;
+    put_size(json, "occlusion_rms", level.errors->occlusion_rms);
+    put_size(json, "color_error", level.errors->color_error);
   }
   return json;
 }

@@ -222,22 +222,25 @@ def evaluate(
     source: Path | None = None,
     other_source: bool = False,
     levels: tuple[int, int] = (1, 1000),
+    lights: Sequence[str] = ("daylight", "front", "behind", "above", "sky"),
     views: int = 12,
     samples: int = 0,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """How far levels look from the source (docs/error_metric.md): {"views", "warnings", "levels": [{"level",
-    "occlusion_error", "occlusion_rms", "color_error", "color_bias", ...}]}; errors are fractions. The asset keeps them.
+    "occlusion_error", "occlusion_rms", "color_error", "color_bias", "lights", "depth", ...}]}; errors are fractions, None
+    where noise hides them (then "bounds" holds). The asset keeps them if daylight is among the lights.
 
     source: the file that was baked; without it the asset's own level 0. other_source: compare with a file that was not
-    baked, too (then the asset keeps nothing; without it that is an Error). levels: from, to. samples: per pixel; 0: as
-    many as each level's size asks for.
+    baked, too (then the asset keeps nothing; without it that is an Error). levels: from, to. lights: see the default.
+    samples: per pixel and light; 0: as many as each level's size asks for.
     """
     options = {
         "other_source": other_source,
         "first_level": levels[0],
         "last_level": levels[1],
+        "lights": ",".join(lights),
         "views": views,
         "samples": samples,
         "seed": seed,

@@ -126,6 +126,7 @@ TEST(Usage, NonsenseIsOneLineThatPointsToTheHelp) {
       {"evaluate", "a"},
       {"evaluate", "a", "--source", "b", "--levels", "5-2"},
       {"evaluate", "a", "--source", "b", "--views", "0"},
+      {"evaluate", "a", "--source", "b", "--lights", "moon"},
       {"evaluate", "a", "--source", "b", "--spp", "0"},
       {"render", "a.glb"},
       {"render", "a.glb", "-o", "b.exr", "--size", "640"},
@@ -373,8 +374,9 @@ TEST_F(WholeRoad, VerifyAcceptsTheAssetAndFindsABrokenByteInEveryLevel) {
 }
 
 TEST_F(WholeRoad, EvaluateMeasuresWritesPicturesAndRecordsErrors) {
-  expect_quiet_success(farfield({"evaluate", asset, "--source", bush, "--levels", "1-9", "--views", "2", "--spp", "16",
-                                 "--json", path("e.json"), "--sheet", path("e.png"), "--images", path("images")}));
+  expect_quiet_success(
+      farfield({"evaluate", asset, "--source", bush, "--levels", "1-9", "--views", "2", "--spp", "16", "--lights",
+                "daylight,behind", "--json", path("e.json"), "--sheet", path("e.png"), "--images", path("images")}));
   const Json evaluation = Json::parse(contents(path("e.json")));
   ASSERT_GE(evaluation["levels"].size(), 2u);
   for (const Json& level : evaluation["levels"]) {
@@ -384,12 +386,18 @@ TEST_F(WholeRoad, EvaluateMeasuresWritesPicturesAndRecordsErrors) {
     EXPECT_EQ(level["color_bias"].size(), 3u);
     // A bound on nonsense, not on quality: nothing is missing, nothing is twice as large, nothing is black.
     EXPECT_LT(std::abs(level["occlusion_error"].get<double>()), 0.3) << level;
-    EXPECT_LT(level["color_error"].get<double>(), 0.6) << level;
+    EXPECT_LT(level["bounds"]["color_error"][0].get<double>(), 0.6) << level;
+    ASSERT_EQ(level["lights"].size(), 2u);
+    EXPECT_EQ(level["lights"][0]["color_error"], level["color_error"]);
+    EXPECT_EQ(level["lights"][1]["light"], "behind");
+    for (const Json& light : level["lights"]) EXPECT_EQ(light["views"].size(), 2u);
+    EXPECT_LT(std::abs(level["depth"]["camera_mean"].get<double>()), 0.1) << level["depth"];
     for (const Json& bias : level["color_bias"]) EXPECT_LT(std::abs(bias.get<double>()), 0.5) << level;
   }
   const auto pictures = std::distance(fs::directory_iterator(path("images")), {});
-  EXPECT_EQ(static_cast<size_t>(pictures), evaluation["levels"].size() * 2 * 2 + 1);
+  EXPECT_EQ(static_cast<size_t>(pictures), evaluation["levels"].size() * 2 * 2 * 2 + 1);
   EXPECT_TRUE(fs::exists(path("images/level_03_view_01_source.exr")));
+  EXPECT_TRUE(fs::exists(path("images/level_03_view_01_behind_level.exr")));
   EXPECT_GT(fs::file_size(path("e.png")), 1000u);
 
   const Json info = Json::parse(farfield({"info", asset, "--json"}).out);
@@ -426,6 +434,17 @@ TEST_F(WholeRoad, EvaluateRefusesAnotherSourceUnlessToldTo) {
   EXPECT_EQ(output.out, "");
   EXPECT_NE(output.err.find("warning"), std::string::npos) << output.err;
   EXPECT_EQ(Json::parse(contents(path("other.json")))["warnings"].size(), 1u);
+}
+
+TEST_F(WholeRoad, EvaluateSaysUnknownWhereNoiseWins) {
+  const std::vector<std::string> evaluate = {"evaluate", asset, "--source", bush, "--levels", "0-0",
+                                             "--views",  "1",   "--spp",    "4",  "--lights", "daylight"};
+  const ProcessOutput output = farfield(evaluate);  // the source against itself
+  EXPECT_EQ(output.exit_code, 0) << output.err;
+  EXPECT_NE(output.out.find("daylight"), std::string::npos) << output.out;
+  EXPECT_NE(output.out.find("unknown, at most"), std::string::npos) << output.out;
+  const ProcessOutput info = farfield({"info", asset});
+  EXPECT_NE(info.out.find("unknown, at most"), std::string::npos) << info.out;
 }
 
 TEST_F(WholeRoad, EvaluateRefusesLevelsThatAreNotThere) {

@@ -277,12 +277,15 @@ class Look(InAFolder):
     def test_evaluate(self):
         points, quads, _ = quad_grid(40)  # fine enough that coarser levels save something
         farfield.bake(farfield.Mesh(points, quads), self.out, **SMALL)
-        figures = farfield.open(self.out).evaluate(views=2, samples=16)
+        figures = farfield.open(self.out).evaluate(views=2, samples=16, lights=["daylight", "behind"])
         self.assertGreater(len(figures["levels"]), 0)
         self.assertEqual([level["level"] for level in figures["levels"]],
                          [level["level"] for level in farfield.info(self.out)["levels"][1:]])
         for level in figures["levels"]:
             self.assertLess(abs(level["occlusion_error"]), 0.2)
+            self.assertEqual([light["light"] for light in level["lights"]], ["daylight", "behind"])
+        with self.assertRaises(farfield.Error):
+            farfield.open(self.out).evaluate(lights=["moon"])
         self.assertIn("color_error", farfield.info(self.out)["levels"][1])
 
     def test_the_same_picture_each_time(self):

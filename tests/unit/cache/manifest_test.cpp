@@ -65,7 +65,29 @@ TEST(Manifest, ExtremeValuesSurvive) {
   EXPECT_EQ(read->origin, manifest.origin);
   EXPECT_EQ(read->hull, manifest.hull);
   EXPECT_EQ(read->levels[0].file_bytes, uint64_t{1} << 50);
-  EXPECT_EQ(read->levels[0].errors->occlusion_rms, 5e-324);
+  EXPECT_EQ(read->levels[0].errors->occlusion_rms.value, 5e-324);
+}
+
+TEST(Manifest, ErrorsThatNoiseHidesStayUnknown) {
+  Manifest manifest = sample_manifest();
+  manifest.levels[1].errors = LevelErrors{-0.01, 0.04, ErrorSize::unknown(0.002, 0.03)};
+  const Result<Manifest> read = manifest_from_json(manifest_to_json(manifest), "test");
+  ASSERT_TRUE(read) << read.error().message;
+  const LevelErrors& errors = *read->levels[1].errors;
+  EXPECT_FALSE(errors.color_error.value);
+  EXPECT_EQ(errors.color_error.low, 0.002);
+  EXPECT_EQ(errors.color_error.high, 0.03);
+  EXPECT_EQ(errors.occlusion_rms.value, 0.04);
+  // An unknown error without bounds says nothing at all.
+  const Result<Manifest> bare = manifest_from_json(
+      [&] {
+        auto json = nlohmann::json::parse(manifest_to_json(manifest));
+        json["levels"][1]["errors"].erase("color_error_bounds");
+        return json.dump();
+      }(),
+      "test");
+  ASSERT_FALSE(bare);
+  EXPECT_NE(bare.error().message.find("color_error_bounds"), std::string::npos) << bare.error().message;
 }
 
 TEST(Manifest, GoldenTextOfVersion1IsFrozen) {
@@ -173,6 +195,7 @@ TEST(HostileManifest, ValuesThatMakeNoSenseAreNeitherReadNorWritten) {
       {"base_resolution is not positive", [=](auto& m) { m.base_resolution = kNan; }},
       {"a hull point is not finite", [=](auto& m) { m.hull[1].y = static_cast<float>(kNan); }},
       {"its errors are not finite", [=](auto& m) { m.levels[1].errors->color_error = kNan; }},
+      {"its errors are not finite", [=](auto& m) { m.levels[1].errors->occlusion_rms = ErrorSize::unknown(0, kNan); }},
   };
   const TemporaryFolder folder;
   for (const auto* list : {&cases, &not_even_json}) {

@@ -63,6 +63,17 @@ TEST(InfoTable, SaysWhenNothingWasEvaluated) {
   EXPECT_NE(info_table("oak.farfield", manifest).find("not evaluated"), std::string::npos);
 }
 
+TEST(InfoTable, SaysWhatNoiseHidesInWords) {
+  Manifest manifest = two_levels();
+  manifest.levels[1].errors->color_error = ErrorSize::unknown(0.0, 0.0123);
+  const std::string text = info_table("oak.farfield", manifest);
+  EXPECT_NE(text.find("unknown, at most 1.23 %"), std::string::npos) << text;
+  EXPECT_EQ(text.find("0.00 %"), std::string::npos) << text;
+  const auto level = nlohmann::json::parse(info_json("oak.farfield", manifest))["levels"][1];
+  EXPECT_TRUE(level["color_error"].is_null());
+  EXPECT_EQ(level["bounds"]["color_error"], nlohmann::json({0.0, 0.0123}));
+}
+
 TEST(InfoTable, ShowsHostileNamesOnOneLineEach) {
   Manifest manifest = two_levels();
   manifest.source = "evil\n\x1b[2Jname";
