@@ -15,7 +15,7 @@ namespace farfield {
 namespace {
 
 /// In voxels: how far light must get away.
-constexpr float kEscapeLength = 0.5f;
+constexpr double kEscapeLength = 0.5;
 /// In voxels: light that goes on starts this far from the face it leaves.
 constexpr float kClearance = 1e-3f;
 /// What the measurement of a brick counts in each of its voxels, as light of weight 1 that is sent on.
@@ -49,7 +49,7 @@ std::optional<SentOn> send_on(const LineScene& scene, const SeenLine& line, Spli
   const float weight = component_sum(layered_albedo(m.specular, m.diffuse + m.transmission));
   if (!away || !(weight > 0)) return {};
   const auto size = static_cast<float>(scene.lattice().voxel_size);
-  const float near = kClearance * size, far = kEscapeLength * size;
+  const float near = kClearance * size, far = static_cast<float>(kEscapeLength) * size;
   if (scene.is_stopped_by_macrosurface(line.point(), *away, near, far, random)) return {};  // as it stops the medium's
   return SentOn{*away, weight, !scene.is_stopped_by_geometry(line.point(), *away, near, far, random)};
 }
@@ -70,7 +70,6 @@ void let_escape(double ratio, Voxel& voxel) {
 Result<void> measure_self_shadowing(const LineScene& scene, SparseVolume& volume, const SelfShadowingOptions& options) {
   if (volume.voxels.empty()) return {};
   std::vector<SourceAndMedium> light(volume.voxels.size());
-  const double length = kEscapeLength * volume.lattice.voxel_size;
   FARFIELD_TRY(
       for_lines(scene, {options.lines, options.seed, options.job}, [&](const SeenLine& line, SplitMix& random) {
         if (!line.hit) return;
@@ -78,10 +77,10 @@ Result<void> measure_self_shadowing(const LineScene& scene, SparseVolume& volume
         if (!v) return;
         const auto sent = send_on(scene, line, random);
         if (!sent) return;
-        const Voxel& voxel = volume.voxels[*v];
-        const double sigma = std::sqrt(std::max(0.0f, voxel.sggx.quadratic(sent->direction)));
+        const VoxelRay away{(dvec3(line.point()) - volume.lattice.origin) / volume.lattice.voxel_size,
+                            dvec3(sent->direction), 0, kEscapeLength};
         if (sent->gets_away) light[*v].source.add(sent->weight);
-        light[*v].medium.add(sent->weight * std::exp(-voxel.density * sigma * length));
+        light[*v].medium.add(sent->weight * std::exp(-optical_depth(volume, scene.grid(), away)));
       }));
   const std::vector<double> ratios = shrunk_ratios(volume, light, kPriorLight);
   for (size_t v = 0; v < ratios.size(); ++v) let_escape(ratios[v], volume.voxels[v]);
