@@ -168,7 +168,7 @@ uint64_t least_bytes(const VolumeSize& volume, const Surface& voxelized, const S
   if (any(&FaceMaterial::transmission)) per_voxel += sizeof(PackedColor);
   const uint64_t bytes =
       per_voxel * volume.voxels + sizeof(Brick) * volume.bricks + kTriangle * surface.triangles.size();
-  return bytes - bytes / 10;  // the estimate's own error
+  return bytes - bytes / 3;  // what long lines leave, and the estimate's own error
 }
 
 /// All vertices and stored voxels of a level.
@@ -338,6 +338,7 @@ class Baker {
     options_.job.report(share_done(level, 0.05), stage);
     const Stopwatch watch;
     const VolumeJob job{sub_resolution_,
+                        surface_,
                         {lattice_origin_, resolution},
                         {.rays_per_voxel = options_.rays_per_voxel,
                          .seed = level,
@@ -348,7 +349,11 @@ class Baker {
       return std::move(*stored);
     }
     if (level != last_level_) {  // the root is always wanted
-      FARFIELD_TRY_LET(const auto size, estimate_volume(job.geometry, job.lattice, job.options));
+      VoxelizeOptions estimate;
+      estimate.rays_per_voxel = options_.rays_per_voxel;
+      estimate.seed = level;
+      estimate.job = options_.job.quiet();
+      FARFIELD_TRY_LET(const auto size, estimate_volume(job.geometry, job.lattice, estimate));
       if (least_bytes(size, sub_resolution_, surface_) > most_bytes_worth_writing(level)) {
         level_report.worthless = true;
         level_report.triangles = surface_.triangles.size();
@@ -471,8 +476,10 @@ Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeO
   }
   FARFIELD_TRY(check_replaceable(out));  // before the import, which may take minutes
   options.job.report(0, "import");
-  FARFIELD_TRY_LET(auto asset, import_asset(source, options.import));
-  asset.warnings = without_folder(std::move(asset.warnings), source.parent_path());
+  auto imported = import_asset(source, options.import, options.job.quiet());
+  std::vector<std::string>& warnings = imported ? imported->warnings : imported.error().warnings;
+  warnings = without_folder(std::move(warnings), source.parent_path());
+  FARFIELD_TRY_LET(auto asset, std::move(imported));
   const double import_seconds = watch.seconds();
   FARFIELD_TRY_LET(auto report, bake(std::move(asset), source.filename().string(), out, options));
   report.import_seconds = import_seconds;
@@ -496,8 +503,10 @@ Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, con
     report.total_seconds = watch.seconds();
     return report;
   }
-  FARFIELD_TRY_LET(auto workspace, BakeWorkspace::open(out));
-  FARFIELD_TRY_LET(auto baked, Baker(options, std::move(asset.source), std::move(workspace), std::move(report)).run());
+  FARFIELD_TRY_LET(auto workspace, with_warnings(BakeWorkspace::open(out), report.warnings));
+  const std::vector<std::string> warnings = report.warnings;
+  Baker baker(options, std::move(asset.source), std::move(workspace), std::move(report));
+  FARFIELD_TRY_LET(auto baked, with_warnings(baker.run(), warnings));
   baked.total_seconds = watch.seconds();
   return baked;
 }

@@ -60,8 +60,8 @@ std::optional<Manifest> find_up_to_date(const std::filesystem::path& source, con
 
 /// Bakes `source` into the folder `out` (created; conventionally NAME.farfield). Same source and options give the same
 /// bytes for any thread count. Interrupted bakes resume: finished levels are found by hash and kept; the manifest is
-/// written last. Errors: those of import_asset; InvalidArgument (options); Io (with nothing half-written under a final
-/// name); Cancelled.
+/// written last. Errors, with the warnings that came before: those of import_asset; InvalidArgument (options); Io (with
+/// nothing half-written under a final name); Cancelled.
 Result<BakeReport> bake(const std::filesystem::path& source, const std::filesystem::path& out,
                         const BakeOptions& options);
 

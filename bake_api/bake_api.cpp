@@ -5,6 +5,7 @@
 #include <new>
 
 #include "bake/bake.h"
+#include "bake_api/gather_mesh.h"
 #include "bake_api/memory_guard.h"
 #include "bake_api/source_from_input.h"
 #include "base/bytes.h"
@@ -44,9 +45,11 @@ BakeSummary summary_of(const BakeReport& report) {
   return summary;
 }
 
-tl::unexpected<Error> out_of_memory(const std::string& needed) {
-  return make_error(ErrorCode::OutOfBudget,
-                    "bake: " + needed + "; allow more memory, lower the finest grid, or bake the input in parts");
+tl::unexpected<Error> out_of_memory(const std::string& needed, std::vector<std::string> warnings) {
+  return tl::unexpected<Error>(
+      Error{ErrorCode::OutOfBudget,
+            "bake: " + needed + "; allow more memory, lower the finest grid, or bake the input in parts",
+            std::move(warnings)});
 }
 
 /// Runs a bake within the settings' limits, and says it as one of those if it was ended by one.
@@ -62,11 +65,12 @@ Result<BakeSummary> run_limited(const BakeSettings& settings, const Run& run) {
     if (report) return summary_of(*report);
     if (report.error().code == ErrorCode::Cancelled && guard.exceeded_bytes() > 0) {
       return out_of_memory(fmt::format("it took {} where {} are allowed", format_bytes(guard.exceeded_bytes()),
-                                       format_bytes(settings.memory_limit_bytes)));
+                                       format_bytes(settings.memory_limit_bytes)),
+                           report.error().warnings);
     }
     return tl::unexpected(report.error());
   } catch (const std::bad_alloc&) {
-    return out_of_memory("the system has no more memory");
+    return out_of_memory("the system has no more memory", {});
   }
 }
 
@@ -75,10 +79,10 @@ Result<BakeSummary> run_limited(const BakeSettings& settings, const Run& run) {
 Result<BakeSummary> bake_meshes(const BakeInput& input, const std::string& folder, const BakeSettings& settings) {
   return run_limited(settings, [&](BakeOptions options) -> Result<BakeReport> {
     options.job.report(0, "import");
-    FARFIELD_TRY_LET(SourceMesh mesh, source_from_input(input));
-    FARFIELD_TRY_LET(ImportedAsset asset, condition(std::move(mesh), input.name));
+    FARFIELD_TRY_LET(SourceMesh mesh, source_from_input(input, options.job.quiet()));
+    FARFIELD_TRY_LET(ImportedAsset asset, condition(std::move(mesh), input.name, options.job.quiet()));
     // What a function answers is not in the hash.
-    options.even_if_up_to_date = input.material_function && input.material_key.empty();
+    options.even_if_up_to_date = has_material_function(input) && input.material_key.empty();
     return bake(std::move(asset), input.name, folder, options);
   });
 }

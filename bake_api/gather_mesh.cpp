@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "base/index.h"
+#include "base/result.h"
 #include "import/corner_normals.h"
 
 namespace farfield {
@@ -39,10 +40,10 @@ std::optional<uint32_t> whole_number(const BakeRows<1>& rows, size_t row, uint64
   return static_cast<uint32_t>(value);
 }
 
-/// The first row that has a number that is not finite in the type in which it will be kept.
+/// The first row that has a number that is not finite in the type in which it will be kept. Nothing after a cancel.
 template <typename Kept, int N>
-std::optional<size_t> find_not_finite(const BakeRows<N>& rows) {
-  for (size_t row = 0; row < rows.size(); ++row) {
+std::optional<size_t> find_not_finite(const BakeRows<N>& rows, const Job& job) {
+  for (size_t row = 0; row < rows.size() && !job.is_cancelled(); ++row) {
     for (int column = 0; column < N; ++column) {
       if (!std::isfinite(static_cast<Kept>(rows.at(row, column)))) return row;
     }
@@ -50,18 +51,18 @@ std::optional<size_t> find_not_finite(const BakeRows<N>& rows) {
   return std::nullopt;
 }
 
-// ---- checks
+// ---- checks; what a cancelled one says is of no use
 
 size_t face_count(const BakeMesh& mesh) { return mesh.counts.empty() ? mesh.corners.size() / 3 : mesh.counts.size(); }
 
-Result<void> check_counts(const BakeMesh& mesh, const MeshName& name) {
+Result<void> check_counts(const BakeMesh& mesh, const MeshName& name, const Job& job) {
   const size_t corners = mesh.corners.size();
   if (mesh.counts.empty()) {
     if (corners % 3 == 0) return {};
     return name.error("{} corners are no whole triangles; give the corners of each face as counts", corners);
   }
   uint64_t sum = 0;
-  for (size_t face = 0; face < mesh.counts.size(); ++face) {
+  for (size_t face = 0; face < mesh.counts.size() && !job.is_cancelled(); ++face) {
     const auto count = whole_number(mesh.counts, face, kMostElements);
     if (!count || *count < 3) return name.error("face {} has {} corners; 3 are the fewest", face, mesh.counts.at(face));
     sum += *count;
@@ -70,8 +71,8 @@ Result<void> check_counts(const BakeMesh& mesh, const MeshName& name) {
   return name.error("the counts of {} faces add up to {}, but there are {} corners", mesh.counts.size(), sum, corners);
 }
 
-Result<void> check_corners(const BakeMesh& mesh, const MeshName& name) {
-  for (size_t i = 0; i < mesh.corners.size(); ++i) {
+Result<void> check_corners(const BakeMesh& mesh, const MeshName& name, const Job& job) {
+  for (size_t i = 0; i < mesh.corners.size() && !job.is_cancelled(); ++i) {
     if (whole_number(mesh.corners, i, std::min<uint64_t>(mesh.points.size(), kMostElements))) continue;
     return name.error("corner {} has point {}; there are points 0 to {}", i, mesh.corners.at(i),
                       static_cast<int64_t>(mesh.points.size()) - 1);
@@ -79,15 +80,15 @@ Result<void> check_corners(const BakeMesh& mesh, const MeshName& name) {
   return {};
 }
 
-Result<void> check_materials(const BakeMesh& mesh, const MeshName& name, const BakeInput& input) {
+Result<void> check_materials(const BakeMesh& mesh, const MeshName& name, const BakeInput& input, const Job& job) {
   const size_t faces = face_count(mesh);
   if (!mesh.materials.empty() && mesh.materials.size() != faces) {
     return name.error("{} material ids for {} faces; one for each, or none", mesh.materials.size(), faces);
   }
   // Faces of a mesh without ids have id 0.
-  const bool is_complete = !input.material_function && !input.materials.empty();
+  const bool is_complete = !has_material_function(input) && !input.materials.empty();
   const uint64_t limit = is_complete ? input.materials.size() : kMaxMaterials;
-  for (size_t face = 0; face < mesh.materials.size(); ++face) {
+  for (size_t face = 0; face < mesh.materials.size() && !job.is_cancelled(); ++face) {
     if (whole_number(mesh.materials, face, limit)) continue;
     return name.error("face {} has material {}; there are materials 0 to {}", face, mesh.materials.at(face), limit - 1);
   }
@@ -96,7 +97,7 @@ Result<void> check_materials(const BakeMesh& mesh, const MeshName& name, const B
 
 template <int N>
 Result<void> check_attribute(const BakeAttribute<N>& attribute, const BakeMesh& mesh, const MeshName& name,
-                             const char* what) {
+                             const char* what, const Job& job) {
   if (attribute.values.empty()) return {};
   const bool is_per_point = attribute.per == BakePer::Point;
   const size_t wanted = is_per_point ? mesh.points.size() : mesh.corners.size();
@@ -104,20 +105,20 @@ Result<void> check_attribute(const BakeAttribute<N>& attribute, const BakeMesh& 
     return name.error("{} {} for {} {}; one for each, or none", attribute.values.size(), what, wanted,
                       is_per_point ? "points" : "corners");
   }
-  if (const auto row = find_not_finite<float>(attribute.values)) {
+  if (const auto row = find_not_finite<float>(attribute.values, job)) {
     return name.error("{} {} are not finite", what, *row);
   }
   return {};
 }
 
-Result<void> check_mesh(const BakeMesh& mesh, const MeshName& name, const BakeInput& input) {
-  if (const auto point = find_not_finite<double>(mesh.points)) return name.error("point {} is not finite", *point);
-  FARFIELD_TRY(check_counts(mesh, name));
-  FARFIELD_TRY(check_corners(mesh, name));
-  FARFIELD_TRY(check_materials(mesh, name, input));
-  FARFIELD_TRY(check_attribute(mesh.uv, mesh, name, "uv coordinates"));
-  FARFIELD_TRY(check_attribute(mesh.normals, mesh, name, "normals"));
-  return check_attribute(mesh.colors, mesh, name, "colors");
+Result<void> check_mesh(const BakeMesh& mesh, const MeshName& name, const BakeInput& input, const Job& job) {
+  if (const auto point = find_not_finite<double>(mesh.points, job)) return name.error("point {} is not finite", *point);
+  FARFIELD_TRY(check_counts(mesh, name, job));
+  FARFIELD_TRY(check_corners(mesh, name, job));
+  FARFIELD_TRY(check_materials(mesh, name, input, job));
+  FARFIELD_TRY(check_attribute(mesh.uv, mesh, name, "uv coordinates", job));
+  FARFIELD_TRY(check_attribute(mesh.normals, mesh, name, "normals", job));
+  return check_attribute(mesh.colors, mesh, name, "colors", job);
 }
 
 Result<void> check_instance(const BakeInstance& instance, size_t index, size_t mesh_count) {
@@ -166,10 +167,11 @@ glm::vec<N, float> value_at(const BakeAttribute<N>& attribute, size_t corner, si
   return row_of(attribute.values, attribute.per == BakePer::Point ? point : corner);
 }
 
-/// Appends one instance of a checked mesh.
-void append(const BakeMesh& mesh, const glm::dmat4x3& to_asset, const Attributes& has, SourceMesh& out) {
+/// Appends one instance of a checked mesh; a part of it after a cancel.
+void append(const BakeMesh& mesh, const glm::dmat4x3& to_asset, const Attributes& has, const Job& job,
+            SourceMesh& out) {
   const auto first_position = static_cast<uint32_t>(out.positions.size());
-  for (size_t i = 0; i < mesh.points.size(); ++i) {
+  for (size_t i = 0; i < mesh.points.size() && !job.is_cancelled(); ++i) {
     out.positions.push_back(to_asset * glm::dvec4(mesh.points.at(i, 0), mesh.points.at(i, 1), mesh.points.at(i, 2), 1));
   }
   const glm::dmat3 linear(to_asset);
@@ -177,7 +179,7 @@ void append(const BakeMesh& mesh, const glm::dmat4x3& to_asset, const Attributes
   // A mirror image winds the other way; turned round, its faces agree with its normals again.
   const bool is_mirrored = glm::determinant(linear) < 0;
   size_t begin = 0;
-  for (size_t face = 0; face < face_count(mesh); ++face) {
+  for (size_t face = 0; face < face_count(mesh) && !job.is_cancelled(); ++face) {
     const size_t count = mesh.counts.empty() ? 3 : static_cast<size_t>(mesh.counts.at(face));
     for (size_t i = 0; i < count; ++i) {
       const size_t corner = is_mirrored ? begin + count - 1 - i : begin + i;
@@ -203,15 +205,20 @@ std::vector<BakeInstance> each_mesh_once(size_t mesh_count) {
   return instances;
 }
 
-}  // namespace
+tl::unexpected<Error> cancelled() { return make_error(ErrorCode::Cancelled, "bake: cancelled"); }
 
-Result<SourceMesh> gather_mesh(const BakeInput& input) {
-  SourceMesh out;
+Result<void> check_meshes(const BakeInput& input, const Job& job, std::vector<std::string>& warnings) {
   for (size_t i = 0; i < input.meshes.size(); ++i) {
     const MeshName name(input.meshes[i], i);
-    FARFIELD_TRY(check_mesh(input.meshes[i], name, input));
-    if (face_count(input.meshes[i]) == 0) out.warnings.push_back(name.text() + ": has no faces");
+    const auto checked = check_mesh(input.meshes[i], name, input, job);
+    if (job.is_cancelled()) return cancelled();
+    FARFIELD_TRY(checked);
+    if (face_count(input.meshes[i]) == 0) warnings.push_back(name.text() + ": has no faces");
   }
+  return {};
+}
+
+Result<void> append_all(const BakeInput& input, const Job& job, SourceMesh& out) {
   const auto instances = input.instances.empty() ? each_mesh_once(input.meshes.size()) : input.instances;
   uint64_t points = 0, corners = 0;
   for (size_t i = 0; i < instances.size(); ++i) {
@@ -229,7 +236,19 @@ Result<SourceMesh> gather_mesh(const BakeInput& input) {
   out.positions.reserve(points);
   out.corner_position.reserve(corners);
   const Attributes has = attributes_of(input.meshes);
-  for (const BakeInstance& instance : instances) append(input.meshes[instance.mesh], instance.to_asset, has, out);
+  for (const BakeInstance& instance : instances) {
+    append(input.meshes[instance.mesh], instance.to_asset, has, job, out);
+    if (job.is_cancelled()) return cancelled();
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<SourceMesh> gather_mesh(const BakeInput& input, const Job& job) {
+  SourceMesh out;
+  FARFIELD_TRY(with_warnings(check_meshes(input, job, out.warnings), out.warnings));
+  FARFIELD_TRY(with_warnings(append_all(input, job, out), out.warnings));
   return out;
 }
 

@@ -65,6 +65,14 @@ void add_material(const SourceMaterial& m, TextureHashes& textures, ContentHash&
   for (const SourceTexture* map : m.maps()) hash.add(textures.of(*map));
 }
 
+MaterialFunction one_by_one(const MaterialBatchFunction& batch) {
+  return [batch](const MaterialQuery& query) {
+    MaterialSample sample;
+    batch(&query, &sample, 1);
+    return sample;
+  };
+}
+
 uint64_t hash_of(const SourceMesh& mesh, const std::string& material_key) {
   ContentHash hash;
   hash.add(mesh.positions);
@@ -83,11 +91,13 @@ uint64_t hash_of(const SourceMesh& mesh, const std::string& material_key) {
 
 }  // namespace
 
-Result<SourceMesh> source_from_input(const BakeInput& input) {
-  FARFIELD_TRY_LET(SourceMesh mesh, gather_mesh(input));
+Result<SourceMesh> source_from_input(const BakeInput& input, const Job& job) {
+  FARFIELD_TRY_LET(SourceMesh mesh, gather_mesh(input, job));
   const uint32_t highest = *std::max_element(mesh.face_material.begin(), mesh.face_material.end());
-  FARFIELD_TRY_LET(mesh.materials, gather_materials(input, size_t{highest} + 1));
-  mesh.material_function = input.material_function;
+  FARFIELD_TRY_LET(mesh.materials, with_warnings(gather_materials(input, size_t{highest} + 1), mesh.warnings));
+  if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, "bake: cancelled");
+  mesh.material_batch = input.material_batch_function;
+  mesh.material_function = mesh.material_batch ? one_by_one(mesh.material_batch) : input.material_function;
   mesh.source_hash = hash_of(mesh, input.material_key);
   return mesh;
 }

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The project's Result is the one that hosts see; here are two macros that hand errors on.
+// The project's Result is the one that hosts see; here are two macros that hand errors on, and what goes with one.
 //
 //   FARFIELD_TRY(write_file(path, bytes));               // returns the error, if it is one
 //   FARFIELD_TRY_LET(const auto mesh, read_mesh(path));  // the same, else `mesh` is the value
 #pragma once
 
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "farfield/result.h"  // IWYU pragma: export
 
@@ -26,3 +28,18 @@
 
 /// The same for a Result with a value, which it moves into the declared variable. One per line.
 #define FARFIELD_TRY_LET(declaration, ...) FARFIELD_TRY_LET_(FARFIELD_TRY_NAME_(__LINE__), declaration, __VA_ARGS__)
+
+namespace farfield {
+
+/// The result; an error takes along the warnings that came before it. `earlier` is read when the result is there:
+/// with_warnings(reader.read(), reader.warnings()) is fine.
+template <typename T>
+Result<T> with_warnings(Result<T>&& result, const std::vector<std::string>& earlier) {
+  if (!result) {
+    std::vector<std::string>& warnings = result.error().warnings;
+    warnings.insert(warnings.begin(), earlier.begin(), earlier.end());
+  }
+  return std::move(result);
+}
+
+}  // namespace farfield

@@ -192,6 +192,20 @@ class Evaluator {
   double total_cost_ = 0, done_cost_ = 0;
 };
 
+bool is_other_source(const Manifest& manifest, const Manifest& source) {
+  return source.source_hash != manifest.source_hash;
+}
+
+Result<Evaluation> compare(const EvaluateOptions& options, const Manifest& manifest, const Manifest& source_manifest,
+                           const fs::path& source_folder) {
+  if (is_other_source(manifest, source_manifest) && !options.other_source)
+    return tl::unexpected(other_source_error(options));
+  const Box3 source_bounds = in_source_space(source_manifest.bounds, source_manifest);
+  FARFIELD_TRY_LET(const auto plans, plan_evaluation(manifest, source_bounds, options));
+  FARFIELD_TRY_LET(const auto source, AssetView::open(source_folder, 0.0f));
+  return Evaluator(options, *source, source_bounds).run(plans);
+}
+
 /// Puts the errors into the asset's manifest, where `farfield info` finds them.
 Result<void> record_errors(const fs::path& asset, const std::vector<LevelEvaluation>& levels) {
   FARFIELD_TRY_LET(auto manifest, read_manifest(asset));
@@ -232,22 +246,18 @@ bool LevelEvaluation::has_daylight() const {
 
 Result<Evaluation> evaluate(const EvaluateOptions& options) {
   FARFIELD_TRY(check_options(options));
-  FARFIELD_TRY_LET(auto manifest, read_manifest(options.asset));
+  FARFIELD_TRY_LET(const auto manifest, read_manifest(options.asset));
   FARFIELD_TRY_LET(auto folder, TemporaryFolder::create());
   const bool has_source = !options.source.empty();
   const fs::path& source_folder = has_source ? folder.path() : options.asset;
-  FARFIELD_TRY_LET(auto source_manifest,
-                   has_source ? bake_source(options, source_folder) : read_manifest(options.asset));
+  FARFIELD_TRY_LET(const auto source_manifest, has_source ? bake_source(options, source_folder) : manifest);
 
-  const bool is_other = source_manifest.source_hash != manifest.source_hash;
-  if (is_other && !options.other_source) return tl::unexpected(other_source_error(options));
-
-  const Box3 source_bounds = in_source_space(source_manifest.bounds, source_manifest);
-  FARFIELD_TRY_LET(auto plans, plan_evaluation(manifest, source_bounds, options));
-  FARFIELD_TRY_LET(auto source, AssetView::open(source_folder, 0.0f));
-
-  FARFIELD_TRY_LET(auto evaluation, Evaluator(options, *source, source_bounds).run(plans));
-  if (const std::string reason = why_not_recorded(options, is_other); !reason.empty()) {
+  // What the import warned of is as true of the pictures.
+  auto compared = compare(options, manifest, source_manifest, source_folder);
+  FARFIELD_TRY_LET(auto evaluation, with_warnings(std::move(compared), source_manifest.warnings));
+  evaluation.warnings = source_manifest.warnings;
+  if (const std::string reason = why_not_recorded(options, is_other_source(manifest, source_manifest));
+      !reason.empty()) {
     evaluation.warnings.push_back(reason);
     return evaluation;
   }

@@ -62,7 +62,7 @@ struct Evaluation {
   std::vector<LevelEvaluation> levels;  ///< finest first
   int views = 0;
   std::vector<vec3> directions;       ///< of the views: unit, the way the camera looks
-  std::vector<std::string> warnings;  ///< one line each
+  std::vector<std::string> warnings;  ///< one line each; those of the source's import first
 };
 
 /// Renders every chosen level and the source from the same views, under the same lights, at one pixel per voxel of the

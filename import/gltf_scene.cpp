@@ -152,6 +152,11 @@ class SceneReader {
 
   Result<GltfScene> read() {
     scene_.warnings = document_.warnings;
+    return with_warnings(read_all(), scene_.warnings);
+  }
+
+ private:
+  Result<GltfScene> read_all() {
     for (size_t m = 0; m < model_.meshes.size(); ++m) scene_.meshes.push_back(read_mesh_or_nothing(m));
     const std::vector<int> order = scene_nodes(document_);
     flatten_nodes(order);
@@ -163,7 +168,6 @@ class SceneReader {
     return std::move(scene_);
   }
 
- private:
   void warn(std::string text) { scene_.warnings.push_back(std::move(text)); }
 
   /// One broken mesh does not stop a scene: it stays empty, and is warned about.

@@ -92,7 +92,10 @@ std::shared_ptr<const Texture> ImageFiles::read(const fs::path& folder, std::str
   }
   auto image = to_texture(bytes, path, use);
   if (image) return found->second = std::make_shared<const Texture>(std::move(*image));
-  if (image.error().code == ErrorCode::Io) ready_ = tl::unexpected(image.error());
+  if (image.error().code == ErrorCode::Io) {
+    ready_ = tl::unexpected(image.error());
+    return nullptr;
+  }
   mesh_.warnings.push_back(fmt::format("texture: {}; the plain colour is used", image.error().message));
   return nullptr;
 }

@@ -299,7 +299,10 @@ class MaterialReader {
     if (!bytes) return without_image(bytes.error());
     auto decoded = decode_texture(*bytes, fmt::format("{}: image {}", document_.name, index), use);
     if (decoded) return std::make_shared<const Texture>(std::move(*decoded));
-    if (decoded.error().code == ErrorCode::Io) ready_ = tl::unexpected(decoded.error());
+    if (decoded.error().code == ErrorCode::Io) {
+      ready_ = tl::unexpected(decoded.error());
+      return nullptr;
+    }
     return without_image(decoded.error());
   }
 
@@ -339,6 +342,13 @@ class GltfMeshReader {
   Result<SourceMesh> read(int mesh) {
     mesh_.warnings = document_.warnings;
     mesh_.source_files = document_.files;
+    return with_warnings(read_all(mesh), mesh_.warnings);
+  }
+
+ private:
+  static vec2 no_uv() { return vec2(std::numeric_limits<float>::quiet_NaN()); }
+
+  Result<SourceMesh> read_all(int mesh) {
     FARFIELD_TRY(mesh >= 0 ? read_one(mesh) : read_scene());
     FARFIELD_TRY(materials_.ready());
     if (!mesh_.corner_uv.empty()) mesh_.corner_uv.resize(mesh_.corner_count(), no_uv());
@@ -346,9 +356,6 @@ class GltfMeshReader {
     if (!mesh_.corner_normal.empty()) mesh_.corner_normal.resize(mesh_.corner_count(), vec3(0.0f));
     return std::move(mesh_);
   }
-
- private:
-  static vec2 no_uv() { return vec2(std::numeric_limits<float>::quiet_NaN()); }
 
   Result<void> read_one(int mesh) {
     if (mesh >= static_cast<int>(model_.meshes.size())) {

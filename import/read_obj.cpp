@@ -27,7 +27,10 @@ class ObjReader {
         name_(path.string()),
         materials_(path.parent_path(), mesh_) {}
 
-  Result<SourceMesh> read() {
+  Result<SourceMesh> read() { return with_warnings(read_all(), mesh_.warnings); }
+
+ private:
+  Result<SourceMesh> read_all() {
     while (!text_.at_end()) read_line();
     FARFIELD_TRY(materials_.finish());
     if (mesh_.corner_count() > UINT32_MAX) {
@@ -41,7 +44,6 @@ class ObjReader {
     return std::move(mesh_);
   }
 
- private:
   /// What is to be said once, however often it is met.
   struct Ignored {
     size_t count = 0;

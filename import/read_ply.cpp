@@ -115,7 +115,10 @@ class PlyReader {
         folder_(path.parent_path()),
         name_(path.string()) {}
 
-  Result<SourceMesh> read() {
+  Result<SourceMesh> read() { return with_warnings(read_all(), mesh_.warnings); }
+
+ private:
+  Result<SourceMesh> read_all() {
     FARFIELD_TRY_LET(header_, read_ply_header(data_, name_));
     PlyValues values(data_.substr(header_.body_offset), header_.encoding);
     for (const PlyElement& element : header_.elements) {
@@ -131,7 +134,6 @@ class PlyReader {
     return std::move(mesh_);
   }
 
- private:
   tl::unexpected<Error> bad(const std::string& what) const {
     return make_error(ErrorCode::BadFile, fmt::format("{}: {}", name_, what));
   }

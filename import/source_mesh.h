@@ -39,6 +39,7 @@ struct SourceMesh {
   std::vector<uint32_t> face_material;    ///< index into materials
   std::vector<SourceMaterial> materials;
   MaterialFunction material_function;    ///< a host's own; if set, `materials` give names and modes only
+  MaterialBatchFunction material_batch;  ///< answers as material_function, many places at once; may be empty
   std::vector<std::string> warnings;     ///< one line each
   std::vector<HashedFile> source_files;  ///< that the main file refers to, relative to its folder, in order of use
   uint64_t source_hash = 0;              ///< see hash_source(); set by read_source()

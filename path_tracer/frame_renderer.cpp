@@ -29,6 +29,10 @@ namespace {
 constexpr int kLargestSide = 1 << 15;
 constexpr uint64_t kMostManifestBytes = 16 << 20;
 
+// Goes up when the same scene, assets and options come to give other pictures, so that a shot that was begun before
+// does not go on with frames that look otherwise.
+constexpr int kLooksVersion = 2;
+
 // A file's name, size and time of change: enough to see that it is another one.
 std::string identity(const fs::path& path) {
   if (path.empty()) return "none";
@@ -46,12 +50,13 @@ uint64_t manifest_hash(const fs::path& folder) {
 std::string make_fingerprint(const RenderOptions& options, std::span<const fs::path> asset_folders) {
   const TraceOptions& trace = options.trace;
   std::string text = fmt::format(
-      "size {}x{} spp {} seed {} depth {} roulette {} clamp {} strategy {} transparent {} budget {} scale {} blend {} "
+      "farfield {} looks {} size {}x{} spp {} seed {} depth {} roulette {} clamp {} strategy {} transparent {} budget "
+      "{} scale {} blend {} "
       "full {} exposure {} cryptomatte {} camera {} fps {} scene {} environment {} sky {} assets",
-      options.width, options.height, trace.samples_per_pixel, trace.seed, trace.max_depth, trace.roulette_depth,
-      trace.clamp_indirect, static_cast<int>(trace.strategy), trace.transparent, options.budget_bytes,
-      options.lod_scale, static_cast<int>(options.blend), options.full_detail, options.exposure_stops,
-      options.cryptomatte, options.camera, options.frames_per_second, identity(options.scene),
+      FARFIELD_VERSION, kLooksVersion, options.width, options.height, trace.samples_per_pixel, trace.seed,
+      trace.max_depth, trace.roulette_depth, trace.clamp_indirect, static_cast<int>(trace.strategy), trace.transparent,
+      options.budget_bytes, options.lod_scale, static_cast<int>(options.blend), options.full_detail,
+      options.exposure_stops, options.cryptomatte, options.camera, options.frames_per_second, identity(options.scene),
       identity(options.environment), options.sky);
   for (const fs::path& folder : asset_folders)
     if (!folder.empty()) text += fmt::format(" {}:{}", folder.filename().string(), to_hex(manifest_hash(folder)));

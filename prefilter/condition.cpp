@@ -122,8 +122,8 @@ class Triangulation {
   Triangulation(SourceMesh& mesh, const WeldResult& welded, SourceSurface& surface)
       : mesh_(mesh), welded_(welded), surface_(surface) {}
 
-  void run(const std::vector<uint32_t>& source_face) {
-    for (size_t face = 0; face < mesh_.face_count(); ++face) add_face(face, source_face[face]);
+  void run(const std::vector<uint32_t>& source_face, const Job& job) {
+    for (size_t face = 0; face < mesh_.face_count() && !job.is_cancelled(); ++face) add_face(face, source_face[face]);
     if (degenerate_ > 0) mesh_.warnings.push_back(fmt::format("{} faces have no area; dropped", degenerate_));
     if (repeated_ > 0) {
       mesh_.warnings.push_back(
@@ -232,16 +232,17 @@ std::vector<std::string> limit(std::vector<std::string> warnings) {
   return warnings;
 }
 
-}  // namespace
+tl::unexpected<Error> cancelled() { return make_error(ErrorCode::Cancelled, "import: cancelled"); }
 
-Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name) {
+Result<ImportedAsset> condition_mesh(SourceMesh& mesh, const std::string& name, const Job& job) {
   const std::vector<uint32_t> source_face = drop_faces_that_are_not_finite(mesh);
   FARFIELD_TRY_LET(const auto origin, choose_origin(mesh, name));
   std::vector<vec3> positions;
   positions.reserve(mesh.positions.size());
   for (const dvec3& p : mesh.positions) positions.emplace_back(p - origin);
   mesh.positions = {};
-  WeldResult welded = weld(positions, mesh.face_begin, mesh.corner_position);
+  WeldResult welded = weld(positions, mesh.face_begin, mesh.corner_position, job);
+  if (job.is_cancelled()) return cancelled();
   positions = {};
   if (100 * welded.near_welds > welded.positions.size()) {  // a few happen in any large mesh
     mesh.warnings.push_back(fmt::format("{} vertices joined with others within rounding of them", welded.near_welds));
@@ -253,7 +254,9 @@ Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name) {
   surface.positions = std::move(welded.positions);
   surface.materials = std::move(mesh.materials);
   surface.material_function = std::move(mesh.material_function);
-  Triangulation(mesh, welded, surface).run(source_face);
+  surface.material_batch = std::move(mesh.material_batch);
+  Triangulation(mesh, welded, surface).run(source_face, job);
+  if (job.is_cancelled()) return cancelled();
   if (surface.triangles.empty()) {
     return make_error(ErrorCode::BadFile, fmt::format("{}: no face has any area", name));
   }
@@ -265,9 +268,15 @@ Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name) {
   return asset;
 }
 
-Result<ImportedAsset> import_asset(const fs::path& path, const ImportOptions& options) {
+}  // namespace
+
+Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name, const Job& job) {
+  return with_warnings(condition_mesh(mesh, name, job), mesh.warnings);
+}
+
+Result<ImportedAsset> import_asset(const fs::path& path, const ImportOptions& options, const Job& job) {
   FARFIELD_TRY_LET(auto mesh, read_source(path, options));
-  return condition(std::move(mesh), path.string());
+  return condition(std::move(mesh), path.string(), job);
 }
 
 }  // namespace farfield

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/job.h"
 #include "base/result.h"
 #include "import/read_source.h"
 #include "prefilter/source_surface.h"
@@ -27,10 +28,11 @@ struct ImportedAsset {
 /// vertices that share a position up to rounding are welded, triangles that coincide are kept once, degenerate and NaN
 /// faces are dropped with a warning. What lies at corners stays there: nothing is averaged. `name` is for messages.
 /// Errors: BadFile (no face with area is left), Unsupported (a longest side outside [1e-6, 1e9], which single precision
-/// cannot work in).
-Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name);
+/// cannot work in), Cancelled; with the mesh's warnings.
+Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name, const Job& job = {});
 
-/// read_source() and condition(). Errors: those of both.
-Result<ImportedAsset> import_asset(const std::filesystem::path& path, const ImportOptions& options = {});
+/// read_source(), which hears no cancel, and condition(). Errors: those of both.
+Result<ImportedAsset> import_asset(const std::filesystem::path& path, const ImportOptions& options = {},
+                                   const Job& job = {});
 
 }  // namespace farfield

@@ -35,48 +35,83 @@ float share_of(const TrianglePart& part) {
   return std::abs((b.y - a.y) * (c.z - a.z) - (b.z - a.z) * (c.y - a.y));
 }
 
-/// What the host's function, or the materials' maps, say of a spot around a point of the source; `share`: the spot's
-/// area, of the triangle's.
-MaterialSample sample_spot(const SourceSurface& source, uint32_t triangle, const vec3& barycentric, float share) {
-  const UvTriangle uv = source.uv_of(triangle);
-  const vec4 color = source.color_at(triangle, barycentric);
-  const float side = std::sqrt(share);
-  if (source.material_function) {
-    MaterialQuery query;
-    query.material = source.material[triangle];
-    query.face = source.source_face[triangle];
-    query.uv = uv_at(uv, barycentric);
-    query.duv_dx = 0.5f * side * (uv[1] - uv[0]);
-    query.duv_dy = 0.5f * side * (uv[2] - uv[0]);
-    query.color = color;
-    return in_range(source.material_function(query));
-  }
-  const SourceMaterial& material = source.material_of(triangle);
-  const float width = is_usable(uv) ? side * std::sqrt(area_of(uv)) : 1.0f;
-  return material_sample(material, textures_at(material, uv_at(uv, barycentric), width, color.w), vec3(color));
+/// A point of the source and how much around it counts.
+struct Spot {
+  uint32_t triangle;
+  vec3 barycentric;
+  float share;  ///< area of the spot, of the triangle's
+};
+
+MaterialQuery query_at(const SourceSurface& source, const Spot& spot) {
+  const UvTriangle uv = source.uv_of(spot.triangle);
+  const float side = std::sqrt(spot.share);
+  MaterialQuery query;
+  query.material = source.material[spot.triangle];
+  query.face = source.source_face[spot.triangle];
+  query.uv = uv_at(uv, spot.barycentric);
+  query.duv_dx = 0.5f * side * (uv[1] - uv[0]);
+  query.duv_dy = 0.5f * side * (uv[2] - uv[0]);
+  query.color = source.color_at(spot.triangle, spot.barycentric);
+  return query;
 }
 
-/// The mean of the function's answers at points that are spread evenly over the part.
-MaterialSample average_function(const SourceSurface& source, const TrianglePart& part) {
+/// What the host's function says of spots: in one call, if it takes many.
+std::vector<MaterialSample> ask_function(const SourceSurface& source, std::span<const Spot> spots) {
+  std::vector<MaterialQuery> queries;
+  queries.reserve(spots.size());
+  for (const Spot& spot : spots) queries.push_back(query_at(source, spot));
+  std::vector<MaterialSample> samples(spots.size());
+  if (source.material_batch) {
+    source.material_batch(queries.data(), samples.data(), queries.size());
+  } else {
+    std::ranges::transform(queries, samples.begin(), source.material_function);
+  }
+  for (MaterialSample& sample : samples) sample = in_range(sample);
+  return samples;
+}
+
+MaterialSample look_at_maps(const SourceSurface& source, const Spot& spot) {
+  const UvTriangle uv = source.uv_of(spot.triangle);
+  const vec4 color = source.color_at(spot.triangle, spot.barycentric);
+  const SourceMaterial& material = source.material_of(spot.triangle);
+  const float width = is_usable(uv) ? std::sqrt(spot.share * area_of(uv)) : 1.0f;
+  return material_sample(material, textures_at(material, uv_at(uv, spot.barycentric), width, color.w), vec3(color));
+}
+
+/// What the host's function, or the materials' maps, say of spots.
+std::vector<MaterialSample> sample_spots(const SourceSurface& source, std::span<const Spot> spots) {
+  if (source.material_function) return ask_function(source, spots);
+  std::vector<MaterialSample> samples;
+  for (const Spot& spot : spots) samples.push_back(look_at_maps(source, spot));
+  return samples;
+}
+
+/// Adds kFunctionSamples points that are spread evenly over the part.
+void add_spots(const TrianglePart& part, std::vector<Spot>& spots) {
   constexpr int kSide = 4;  // kSide^2 small triangles: their middles
   static_assert(kSide * kSide == kFunctionSamples);
-  MaterialSample sum{vec3(0.0f), vec3(0.0f), vec3(0.0f), 0, 0, vec3(0.0f), vec3(0.0f)};
-  float roughness2 = 0;
   for (int row = 0; row < kSide; ++row) {
     for (int i = 0; i < 2 * (kSide - row) - 1; ++i) {
       const bool is_upright = i % 2 == 0;
       const float third = is_upright ? 1.0f / 3 : 2.0f / 3;
       const vec2 at = vec2(static_cast<float>(i / 2) + third, static_cast<float>(row) + third) / float(kSide);
-      const MaterialSample s =
-          sample_spot(source, part.triangle, part.at({1 - at.x - at.y, at.x, at.y}), share_of(part) / kFunctionSamples);
-      sum.diffuse += s.opacity * s.diffuse;
-      sum.specular += s.opacity * s.specular;
-      sum.transmission += s.opacity * s.transmission;
-      roughness2 += s.opacity * std::pow(s.roughness, 4.0f);
-      sum.normal += s.opacity * (s.normal / std::max(glm::length(s.normal), 1e-6f));
-      sum.emission += s.opacity * s.emission;
-      sum.opacity += s.opacity;
+      spots.push_back({part.triangle, part.at({1 - at.x - at.y, at.x, at.y}), share_of(part) / kFunctionSamples});
     }
+  }
+}
+
+/// The mean of the function's answers at the spots of a part.
+MaterialSample mean_of(std::span<const MaterialSample> samples) {
+  MaterialSample sum{vec3(0.0f), vec3(0.0f), vec3(0.0f), 0, 0, vec3(0.0f), vec3(0.0f)};
+  float roughness2 = 0;
+  for (const MaterialSample& s : samples) {
+    sum.diffuse += s.opacity * s.diffuse;
+    sum.specular += s.opacity * s.specular;
+    sum.transmission += s.opacity * s.transmission;
+    roughness2 += s.opacity * std::pow(s.roughness, 4.0f);
+    sum.normal += s.opacity * (s.normal / std::max(glm::length(s.normal), 1e-6f));
+    sum.emission += s.opacity * s.emission;
+    sum.opacity += s.opacity;
   }
   if (!(sum.opacity > 0)) return {.opacity = 0};
   const float share = 1 / sum.opacity;
@@ -84,13 +119,12 @@ MaterialSample average_function(const SourceSurface& source, const TrianglePart&
           sum.specular * share,
           sum.transmission * share,
           std::sqrt(std::sqrt(roughness2 * share)),
-          sum.opacity / kFunctionSamples,
+          sum.opacity / static_cast<float>(samples.size()),
           sum.normal * share,
           sum.emission * share};
 }
 
-MaterialSample average_sample(const SourceSurface& source, const TrianglePart& part) {
-  if (source.material_function) return average_function(source, part);
+MaterialSample average_maps(const SourceSurface& source, const TrianglePart& part) {
   const SourceMaterial& material = source.material_of(part.triangle);
   const vec4 color = source.color_at(part.triangle, part.at(kMiddle));
   return material_sample(material, average_textures(material, uv_of(source, part), color.w), vec3(color));
@@ -169,10 +203,7 @@ bool is_uniform(const SourceSurface& source, const TrianglePart& part) {
   return c[0] == c[1] && c[1] == c[2];
 }
 
-}  // namespace
-
-FaceMaterial average_material(const SourceSurface& source, const TrianglePart& part) {
-  const MaterialSample sample = average_sample(source, part);
+FaceMaterial to_face(const SourceSurface& source, const TrianglePart& part, const MaterialSample& sample) {
   FaceMaterial out;
   out.sggx = SymMat3::outer(vec3(glm::normalize(source.area_vector(part.triangle))));
   out.diffuse = sample.diffuse;
@@ -185,6 +216,28 @@ FaceMaterial average_material(const SourceSurface& source, const TrianglePart& p
   return out;
 }
 
+}  // namespace
+
+std::vector<FaceMaterial> average_materials(const SourceSurface& source, std::span<const TrianglePart> parts,
+                                            const Job& job) {
+  std::vector<FaceMaterial> out(parts.size());
+  if (!source.material_function) {
+    for (size_t i = 0; i < parts.size() && !job.is_cancelled(); ++i) {
+      out[i] = to_face(source, parts[i], average_maps(source, parts[i]));
+    }
+    return out;
+  }
+  std::vector<Spot> spots;
+  spots.reserve(kFunctionSamples * parts.size());
+  for (const TrianglePart& part : parts) add_spots(part, spots);
+  const std::vector<MaterialSample> samples = ask_function(source, spots);
+  for (size_t i = 0; i < parts.size(); ++i) {
+    const std::span of_part = std::span(samples).subspan(kFunctionSamples * i, kFunctionSamples);
+    out[i] = to_face(source, parts[i], mean_of(of_part));
+  }
+  return out;
+}
+
 bool is_varied(const SourceSurface& source, const TrianglePart& part, float width) {
   if (has_varied_normals(source, part)) return true;
   if (is_uniform(source, part)) return false;
@@ -192,10 +245,15 @@ bool is_varied(const SourceSurface& source, const TrianglePart& part, float widt
   const float share = share_of(part) / static_cast<float>(steps * steps);
   Look lower{MaterialSample{}}, upper = lower;  // from the first spot on; both keep its normal
   for (int i = 0; i <= steps; ++i) {
+    std::vector<Spot> row;
     for (int j = 0; i + j <= steps; ++j) {
       const vec2 at = vec2(i, j) / static_cast<float>(steps);
-      const Look look(sample_spot(source, part.triangle, part.at({1 - at.x - at.y, at.x, at.y}), share));
-      if (i + j == 0) lower = upper = look;
+      row.push_back({part.triangle, part.at({1 - at.x - at.y, at.x, at.y}), share});
+    }
+    const std::vector<MaterialSample> samples = sample_spots(source, row);
+    for (size_t j = 0; j < samples.size(); ++j) {
+      const Look look(samples[j]);
+      if (i == 0 && j == 0) lower = upper = look;
       for (size_t c = 0; c < look.channels.size(); ++c) {
         lower.channels[c] = std::min(lower.channels[c], look.channels[c]);
         upper.channels[c] = std::max(upper.channels[c], look.channels[c]);
@@ -214,9 +272,11 @@ Surface average_faces(const SourceSurface& source, const Job& job) {
   surface.triangles = source.triangles;
   surface.materials.resize(source.triangles.size());
   parallel_for(source.triangles.size(), 1024, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end && !job.is_cancelled(); ++i) {
-      surface.materials[i] = average_material(source, {static_cast<uint32_t>(i)});
-    }
+    if (job.is_cancelled()) return;
+    std::vector<TrianglePart> whole;
+    for (size_t i = begin; i < end; ++i) whole.push_back({static_cast<uint32_t>(i)});
+    std::ranges::copy(average_materials(source, whole, job),
+                      surface.materials.begin() + static_cast<std::ptrdiff_t>(begin));
   });
   return surface;
 }

@@ -4,6 +4,8 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "base/job.h"
 #include "prefilter/source_surface.h"
@@ -21,10 +23,11 @@ struct TrianglePart {
   }
 };
 
-/// Averages over the part of textures, vertex colours, shading normals and the spread of normal maps; of a host's
-/// material function over kFunctionSamples points. shading_sggx is 0 unless the source has shading normals. Pure, as
-/// far as the function is.
-FaceMaterial average_material(const SourceSurface& source, const TrianglePart& part);
+/// For each part: averages over it of textures, vertex colours, shading normals and the spread of normal maps; of a
+/// host's material function over kFunctionSamples points. shading_sggx is 0 unless the source has shading normals.
+/// Pure, as far as the function is. Incomplete when cancelled.
+std::vector<FaceMaterial> average_materials(const SourceSurface& source, std::span<const TrianglePart> parts,
+                                            const Job& job = {});
 inline constexpr int kFunctionSamples = 16;
 
 /// Whether the part would look different at some spots of this width (scene units) if it had one material: base colour,

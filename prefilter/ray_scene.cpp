@@ -4,6 +4,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 namespace farfield {
 
 Result<RayScene> RayScene::build(const Surface& geometry) {
@@ -18,9 +22,9 @@ Result<RayScene> RayScene::build(const Surface& geometry) {
   return result;
 }
 
-std::optional<RayHit> RayScene::first_hit(const vec3& origin, const vec3& direction, float length) const {
+std::optional<RayHit> RayScene::first_hit(const vec3& origin, const vec3& direction, float near, float far) const {
   EmbreeContext context = make_context();
-  EmbreeRayHit ray = make_ray_hit(origin, direction, 0, length);
+  EmbreeRayHit ray = make_ray_hit(origin, direction, near, far);
   if (!trace_nearest(scene_.get(), context, ray)) return std::nullopt;
   return RayHit{ray.hit.primID, ray.ray.tfar, vec3(ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z)};
 }
@@ -29,6 +33,39 @@ bool RayScene::is_occluded(const vec3& origin, const vec3& direction, float near
   EmbreeContext context = make_context();
   EmbreeRay ray = make_ray(origin, direction, near, far);
   return trace_occlusion(scene_.get(), context, ray);
+}
+
+Result<OpacityScene> OpacityScene::build(const Surface& geometry) {
+  FARFIELD_TRY_LET(auto scene, RayScene::build(geometry));
+  return OpacityScene(geometry, std::move(scene));
+}
+
+OpacityScene::OpacityScene(const Surface& geometry, RayScene scene)
+    : geometry_(&geometry),
+      scene_(std::move(scene)),
+      is_opaque_(std::ranges::all_of(geometry.materials, [](const FaceMaterial& m) { return m.opacity >= 1; })) {}
+
+std::optional<RayHit> OpacityScene::first_stop(const vec3& origin, const vec3& direction, float far,
+                                               SplitMix& random) const {
+  return first_stop(origin, direction, 0, far, random);
+}
+
+std::optional<RayHit> OpacityScene::first_stop(const vec3& origin, const vec3& direction, float near, float far,
+                                               SplitMix& random) const {
+  while (near <= far) {
+    const auto hit = scene_.first_hit(origin, direction, near, far);
+    if (!hit) return {};
+    const float opacity = geometry_->materials[hit->triangle].opacity;
+    if (opacity >= 1 || to_unit_float(random.next()) < opacity) return hit;
+    near = std::nextafter(hit->distance, std::numeric_limits<float>::infinity());
+  }
+  return {};
+}
+
+bool OpacityScene::is_stopped(const vec3& origin, const vec3& direction, float near, float far,
+                              SplitMix& random) const {
+  if (is_opaque_) return scene_.is_occluded(origin, direction, near, far);
+  return first_stop(origin, direction, near, far, random).has_value();
 }
 
 }  // namespace farfield

@@ -6,6 +6,7 @@
 
 #include "base/embree.h"
 #include "base/result.h"
+#include "base/split_mix.h"
 #include "base/vec.h"
 #include "prefilter/surface.h"
 
@@ -24,7 +25,7 @@ class RayScene {
   /// Errors: Unsupported (Embree does not start), Io (out of memory, or what else Embree says).
   static Result<RayScene> build(const Surface& geometry);
 
-  std::optional<RayHit> first_hit(const vec3& origin, const vec3& direction, float length) const;
+  std::optional<RayHit> first_hit(const vec3& origin, const vec3& direction, float near, float far) const;
   /// Whether anything is in the way between these distances.
   bool is_occluded(const vec3& origin, const vec3& direction, float near, float far) const;
 
@@ -33,6 +34,29 @@ class RayScene {
 
   EmbreeDevice device_;  // first: the scene lives on it
   EmbreeScene scene_;
+};
+
+/// The same with opacities: a face stops as many rays as its opacity says, and lets the others pass.
+class OpacityScene {
+ public:
+  /// Errors: those of RayScene::build().
+  static Result<OpacityScene> build(const Surface& geometry);
+
+  const Surface& surface() const { return *geometry_; }
+
+  /// The first face that stops the ray. `random` is used only where faces are not opaque.
+  std::optional<RayHit> first_stop(const vec3& origin, const vec3& direction, float far, SplitMix& random) const;
+  /// Whether any face between these distances stops it.
+  bool is_stopped(const vec3& origin, const vec3& direction, float near, float far, SplitMix& random) const;
+
+ private:
+  OpacityScene(const Surface& geometry, RayScene scene);
+  std::optional<RayHit> first_stop(const vec3& origin, const vec3& direction, float near, float far,
+                                   SplitMix& random) const;
+
+  const Surface* geometry_;
+  RayScene scene_;
+  bool is_opaque_;  ///< no ray passes any face
 };
 
 }  // namespace farfield

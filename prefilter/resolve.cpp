@@ -303,8 +303,10 @@ class DetailSplitter {
 ResolvedSurface finish(const SourceSurface& source, const PartMesh& mesh, const Job& job) {
   std::vector<FaceMaterial> materials(mesh.triangles.size());
   parallel_for(materials.size(), 256, [&](size_t begin, size_t end) {
-    for (size_t f = begin; f < end && !job.is_cancelled(); ++f) {
-      materials[f] = average_material(source, mesh.parts[f]);
+    if (job.is_cancelled()) return;
+    const auto averages = average_materials(source, std::span(mesh.parts).subspan(begin, end - begin), job);
+    for (size_t f = begin; f < end; ++f) {
+      materials[f] = averages[f - begin];
       const bool is_cut =
           !source.material_function && source.material_of(mesh.parts[f].triangle).alpha_mode == AlphaMode::Mask;
       if (is_cut) materials[f].opacity = 1;  // the outline says where it is

@@ -3,34 +3,31 @@
 // (after thesis 14.1.4, algorithm Iso; docs/decisions/0010).
 #pragma once
 
-#include <vector>
+#include <cstdint>
 
-#include "base/vec.h"
-#include "scattering/sym_mat3.h"
+#include "base/job.h"
+#include "base/result.h"
+#include "prefilter/line_scene.h"
+#include "prefilter/voxelize.h"
 
 namespace farfield {
 
-/// Bounds of EscapeSums::ratio(). A resolved surface that becomes a medium loses half of what it scatters once, so
-/// nothing needs more than 2.
+/// Bounds of what one voxel's geometry lets away, by what its medium does. A resolved surface that becomes a medium
+/// loses half of what it scatters once, so nothing needs more than 2.
 inline constexpr double kLeastEscape = 0.02, kMostEscape = 2;
 
-/// Sums over light that leaves points of one voxel's geometry. Not thread safe.
-class EscapeSums {
- public:
-  /// Light of `weight` >= 0 leaves in `direction` (unit), and gets a length away past the geometry, or not.
-  void add(const vec3& direction, float weight, bool gets_away);
-  /// The light that gets away by what would get as far in an SGGX medium of this density, within the bounds above; 1
-  /// where nothing was added. Below 1 geometry is clumped: the medium needs self-shadowing A = ratio. Above 1 it is
-  /// smooth: the medium shadows more than it should. s, density and length as in density.h. Pure.
-  double ratio(const SymMat3& s, double density, double length) const;
+/// Makes as much light get away from a voxel's medium as does from its geometry, `ratio` times as much as now (within
+/// the bounds above): less by self-shadowing A = ratio, more by a higher albedo. White stays white.
+void let_escape(double ratio, Voxel& voxel);
 
- private:
-  struct Light {
-    vec3 direction;
-    float weight;
-  };
-  std::vector<Light> light_;
-  double away_ = 0;
+struct SelfShadowingOptions {
+  double lines = 0;
+  uint64_t seed = 0;
+  Job job{};  ///< reports from the calling thread alone
 };
+
+/// Sets self_shadowing and raises albedos, for the densities that the volume has. Light goes on from what isotropic
+/// lines see first, for half a voxel. The result does not depend on the number of threads. Errors: Cancelled.
+Result<void> measure_self_shadowing(const LineScene& scene, SparseVolume& volume, const SelfShadowingOptions& options);
 
 }  // namespace farfield

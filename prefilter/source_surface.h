@@ -26,7 +26,8 @@ struct SourceSurface {
   std::vector<uint32_t> material;     ///< per triangle: index into `materials`
   std::vector<uint32_t> source_face;  ///< per triangle: the polygon of the file that it is a part of
   std::vector<SourceMaterial> materials;
-  MaterialFunction material_function;  ///< the host's, if it has one: then `materials` give names only
+  MaterialFunction material_function;    ///< the host's, if it has one: then `materials` give names only
+  MaterialBatchFunction material_batch;  ///< answers as material_function, many places at once; may be empty
   dvec3 origin{0.0};  ///< of positions in the source's space; (0,0,0) unless the source lies far from its origin
 
   Box3 bounds() const;

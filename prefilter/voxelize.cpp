@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Candidates first: every triangle marks the voxels it passes through, and these are widened by the reach of a voxel's
 // rays. Then each candidate casts its rays at the triangles, counts hits, averages what it hit, and solves for the
-// density that is hit as often [Loubet 2018, sections 9.2 and 9.3], and for the self-shadowing with which as much light
-// gets away as does from the points that were hit [Loubet 2018, 14.1.4].
+// density that is hit as often [Loubet 2018, sections 9.2 and 9.3].
 #include "prefilter/voxelize.h"
 
 #include <fmt/format.h>
@@ -15,28 +14,20 @@
 #include "base/hash.h"
 #include "base/parallel.h"
 #include "base/result.h"
+#include "base/split_mix.h"
 #include "prefilter/density.h"
 #include "prefilter/ray_scene.h"
-#include "prefilter/self_shadowing.h"
-#include "scattering/albedo.h"
+#include "prefilter/thin_out.h"
 #include "scattering/sggx.h"
-#include "scattering/warp.h"
 
 namespace farfield {
 namespace {
 
 /// How far rays get from their voxel's centre along an axis, in voxels: their middle is in it and they are 1 long.
 constexpr double kReach = 1;
-/// How far light that goes on must get away, in voxels: as far as a ray reaches to either side of its middle.
-constexpr float kEscapeLength = 0.5f;
-/// In voxels: light that goes on starts this far from the face it leaves.
-constexpr float kClearance = 1e-3f;
-/// In voxels: a ray that passes a face goes on this far behind it.
-constexpr float kPassed = 1e-5f;
-
 constexpr uint32_t kMaxRayFactor = 16;    ///< how many times more rays than asked for a voxel may get
 constexpr uint32_t kEnoughMisses = 16;    ///< rays that must get through for a transmittance with 25 % noise
-constexpr uint64_t kManyVoxels = 50'000;  ///< fewer voxels share the rays of this many: seconds of one core
+constexpr uint64_t kManyVoxels = 10'000;  ///< fewer voxels share the rays of this many: seconds of one core
 
 /// Sums over the rays of one voxel.
 struct HitSums {
@@ -92,37 +83,13 @@ class RaySampler {
   std::array<vec2, kCells> circle_;
 };
 
-/// A stream of random bits [Steele, Lea and Flood 2014].
-class SplitMix {
- public:
-  explicit SplitMix(uint64_t seed) : state_(seed) {}
-  uint64_t next() { return mix64(state_ += 0x9e3779b97f4a7c15ull); }
-
- private:
-  uint64_t state_;
-};
-
-/// Where light goes on that arrived along `direction` at a face: a cosine lobe on the side that it came from or, as
-/// often as the face lets light through, on the other.
-vec3 scattered_direction(const FaceMaterial& m, const vec3& geometric_normal, const vec3& direction, uint64_t bits) {
-  const auto unit = [bits](int shift) { return static_cast<float>(bits >> shift & 0x1fffff) * 0x1p-21f; };
-  const float through = component_sum(m.transmission);
-  const float back = component_sum(m.diffuse) + component_sum(m.specular);
-  const bool goes_through = unit(0) * (through + back) < through;
-  // In two steps: the square of a tiny face's normal may be no float.
-  const vec3 normal = glm::normalize(geometric_normal / max_component(glm::abs(geometric_normal)));
-  return cosine_lobe((glm::dot(normal, direction) > 0) == goes_through ? normal : -normal, unit(21), unit(42));
-}
-
 /// What one voxel is measured with.
 struct VoxelRays {
   const Surface& geometry;
-  const RayScene& scene;
+  const OpacityScene& scene;
   vec3 center;
   float size;  ///< of the voxel, and the length of the rays
-  bool is_opaque;
   HitSums hits{};
-  EscapeSums escape{};
 
   /// Casts rays with their middles in the voxel. What a ray hits first counts.
   void cast(uint32_t rays, SplitMix& random) {
@@ -131,44 +98,10 @@ struct VoxelRays {
       const vec3 middle = center + size * sampler.middle(random.next());
       const vec3 direction = sampler.direction(random.next());
       const vec3 origin = middle - 0.5f * size * direction;
-      const auto hit = first_stop(origin, direction, size, random);
+      const auto hit = scene.first_stop(origin, direction, size, random);
       if (!hit) continue;
       hits.add(geometry.materials[hit->triangle]);
-      scatter(origin, direction, *hit, random);
     }
-  }
-
-  /// The first face that stops the ray: faces that are not opaque let some pass.
-  std::optional<RayHit> first_stop(const vec3& origin, const vec3& direction, float length, SplitMix& random) const {
-    float passed = 0;
-    while (true) {
-      const auto hit = scene.first_hit(origin + passed * direction, direction, length - passed);
-      if (!hit) return {};
-      const float opacity = geometry.materials[hit->triangle].opacity;
-      if (opacity >= 1 || to_unit_float(random.next()) < opacity) {
-        return RayHit{hit->triangle, passed + hit->distance, hit->normal};
-      }
-      passed += hit->distance + kPassed * size;
-      if (!(passed < length)) return {};
-    }
-  }
-
-  bool is_blocked(const vec3& origin, const vec3& direction, float near, float far, SplitMix& random) const {
-    if (is_opaque) return scene.is_occluded(origin, direction, near, far);
-    return far > near && first_stop(origin + near * direction, direction, far - near, random).has_value();
-  }
-
-  /// Sends on the light of a hit. What is hidden from where the ray came from, within its length, does not count:
-  /// nobody sees it, and the inside of solid twigs is of that kind.
-  void scatter(const vec3& origin, const vec3& direction, const RayHit& hit, SplitMix& random) {
-    const uint64_t bits = random.next();
-    if (!(max_component(glm::abs(hit.normal)) >= std::numeric_limits<float>::min())) return;  // no face that reflects
-    if (is_blocked(origin, -direction, 0, size - hit.distance, random)) return;
-    const FaceMaterial& m = geometry.materials[hit.triangle];
-    const vec3 away = scattered_direction(m, hit.normal, direction, bits);
-    const vec3 point = origin + hit.distance * direction;
-    escape.add(away, component_sum(layered_albedo(m.specular, m.diffuse + m.transmission)),
-               !is_blocked(point, away, kClearance * size, kEscapeLength * size, random));
   }
 };
 
@@ -176,10 +109,9 @@ struct VoxelRays {
 struct Measurement {
   const Surface& geometry;
   const VoxelLattice& lattice;
-  const RayScene& scene;
+  const OpacityScene& scene;
   uint32_t rays;  ///< per voxel
   uint64_t seed;
-  bool is_opaque;  ///< no ray passes any face
 };
 
 SplitMix random_of_voxel(const ivec3& coordinate, uint64_t seed) {
@@ -187,25 +119,13 @@ SplitMix random_of_voxel(const ivec3& coordinate, uint64_t seed) {
   return SplitMix(mix64(mix64(seed, bits(coordinate.x) << 32 | bits(coordinate.y)), bits(coordinate.z)));
 }
 
-/// Makes as much light get away from a voxel's medium as does from its geometry: less by self-shadowing, more by a
-/// higher albedo. White stays white.
-void let_escape(float ratio, Voxel& voxel) {
-  voxel.self_shadowing = std::min(ratio, 1.0f);
-  if (!(ratio > 1)) return;
-  const vec3 albedo = layered_albedo(voxel.specular, voxel.diffuse + voxel.transmission);
-  const vec3 gain = cluster_albedo(glm::min(albedo, vec3(1.0f)), ratio) / glm::max(albedo, vec3(1e-6f));
-  voxel.diffuse *= gain;
-  voxel.specular *= gain;
-  voxel.transmission *= gain;
-}
-
-/// One voxel, or one with density 0 where no ray hits or chance has it so.
+/// One voxel, or one with density 0 where no ray hits.
 Voxel measure_voxel(const Measurement& m, const ivec3& coordinate) {
   const double size = m.lattice.voxel_size;
   const vec3 center(m.lattice.origin + (dvec3(coordinate) + 0.5) * size);
   SplitMix random = random_of_voxel(coordinate, m.seed);
 
-  VoxelRays voxel_rays{m.geometry, m.scene, center, static_cast<float>(size), m.is_opaque};
+  VoxelRays voxel_rays{m.geometry, m.scene, center, static_cast<float>(size)};
   const HitSums& sums = voxel_rays.hits;
   uint32_t rays = m.rays;
   voxel_rays.cast(rays, random);
@@ -217,11 +137,7 @@ Voxel measure_voxel(const Measurement& m, const ivec3& coordinate) {
   Voxel voxel;
   if (sums.hits == 0) return voxel;
 
-  double depth = optical_depth_of_hits(sums.hits, rays);
-  if (depth < kFaintestDepth) {
-    if (to_unit_float(random.next()) * kFaintestDepth >= depth) return voxel;
-    depth = kFaintestDepth;
-  }
+  const double depth = optical_depth_of_hits(sums.hits, rays);
   const float share = 1 / static_cast<float>(sums.hits);
   voxel.sggx = normalise_sggx(sums.sggx).sggx;
   voxel.density = static_cast<float>(solve_density(voxel.sggx, depth, size));
@@ -230,7 +146,6 @@ Voxel measure_voxel(const Measurement& m, const ivec3& coordinate) {
   voxel.transmission = sums.transmission * share;
   voxel.emission = sums.emission * share;
   if (sums.roughness2_weight > 0) voxel.roughness2 = sums.roughness2 / sums.roughness2_weight;
-  let_escape(static_cast<float>(voxel_rays.escape.ratio(voxel.sggx, voxel.density, kEscapeLength * size)), voxel);
   return voxel;
 }
 
@@ -282,16 +197,12 @@ VoxelSet find_candidates(const Surface& geometry, const VoxelLattice& lattice) {
 }
 
 /// The kept voxels of every stride-th candidate brick of the range; the masks of these bricks become theirs.
-Result<std::vector<std::vector<Voxel>>> measure_bricks(const Surface& geometry, const VoxelLattice& lattice,
+Result<std::vector<std::vector<Voxel>>> measure_bricks(const OpacityScene& geometry, const VoxelLattice& lattice,
                                                        VoxelSet& candidates, size_t stride,
                                                        const VoxelizeOptions& options) {
   std::vector<std::vector<Voxel>> voxels(candidates.coordinates.size());
-  if (voxels.empty()) return voxels;
-  FARFIELD_TRY_LET(const RayScene rays, RayScene::build(geometry));
-  const bool is_opaque =
-      std::ranges::all_of(geometry.materials, [](const FaceMaterial& material) { return material.opacity >= 1; });
-  const Measurement measurement{geometry,     lattice,  rays, rays_per_voxel(candidates.size(), options),
-                                options.seed, is_opaque};
+  const Measurement measurement{geometry.surface(), lattice, geometry, rays_per_voxel(candidates.size(), options),
+                                options.seed};
   const size_t first = std::min<uint64_t>(options.bricks.first, voxels.size());
   const size_t last = first + std::min<uint64_t>(options.bricks.count, voxels.size() - first);
   const size_t count = (last - first + stride - 1) / stride;
@@ -316,9 +227,17 @@ Result<std::vector<std::vector<Voxel>>> measure_bricks(const Surface& geometry, 
 
 Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options) {
   FARFIELD_TRY(check_arguments(geometry, lattice, options));
+  if (geometry.triangles.empty()) return SparseVolume{lattice, {}, {}};
+  FARFIELD_TRY_LET(const auto scene, OpacityScene::build(geometry));
+  return voxelize(scene, lattice, options);
+}
+
+Result<SparseVolume> voxelize(const OpacityScene& geometry, const VoxelLattice& lattice,
+                              const VoxelizeOptions& options) {
+  FARFIELD_TRY(check_arguments(geometry.surface(), lattice, options));
   SparseVolume volume;
   volume.lattice = lattice;
-  VoxelSet candidates = find_candidates(geometry, lattice);
+  VoxelSet candidates = find_candidates(geometry.surface(), lattice);
   FARFIELD_TRY_LET(auto voxels, measure_bricks(geometry, lattice, candidates, 1, options));
   for (size_t i = 0; i < voxels.size(); ++i) {
     std::vector<Voxel>& of_brick = voxels[i];
@@ -344,11 +263,16 @@ Result<VolumeSize> estimate_volume(const Surface& geometry, const VoxelLattice& 
   VoxelizeOptions quietly = options;
   quietly.job = options.job.quiet();
   quietly.bricks = {};
-  FARFIELD_TRY_LET(const auto voxels, measure_bricks(geometry, lattice, candidates, kStride, quietly));
+  FARFIELD_TRY_LET(const auto scene, OpacityScene::build(geometry));
+  FARFIELD_TRY_LET(const auto voxels, measure_bricks(scene, lattice, candidates, kStride, quietly));
+  double kept = 0;
   for (const std::vector<Voxel>& of_brick : voxels) {
-    size.voxels += kStride * of_brick.size();
-    size.bricks += of_brick.empty() ? 0 : kStride;
+    double kept_in_brick = 0;
+    for (const Voxel& voxel : of_brick) kept_in_brick += kept_share(voxel, lattice.voxel_size);
+    kept += kept_in_brick;
+    size.bricks += kept_in_brick < 1 ? 0 : kStride;
   }
+  size.voxels = static_cast<uint64_t>(kStride * kept);
   return size;
 }
 

@@ -9,6 +9,7 @@
 #include "base/job.h"
 #include "base/result.h"
 #include "base/vec.h"
+#include "prefilter/ray_scene.h"
 #include "prefilter/surface.h"
 #include "prefilter/voxel_marks.h"
 #include "scattering/sym_mat3.h"
@@ -23,7 +24,7 @@ struct Voxel {
   vec3 specular{0.0f};
   vec3 transmission{0.0f};
   float roughness2 = 1.0f;
-  float self_shadowing = 1.0f;  ///< A in (0, 1]; 1: none
+  float self_shadowing = 1.0f;  ///< A in (0, 1]; 1: none. Not measured by voxelize()
   vec3 emission{0.0f};          ///< linear radiance of the flakes, both sides
 };
 
@@ -55,17 +56,18 @@ struct VoxelizeOptions {
   Job job{};                      ///< reports from the calling thread alone; polled for every few bricks
 };
 
-/// Mean optical depth over a voxel's side below which voxels are thinned out.
-inline constexpr double kFaintestDepth = 0.02;
-
 /// Measures the volume of all triangles of `geometry`, each of which stops as many rays as its opacity says, with the
 /// rays of thesis algorithm 1, but with their middles in the voxel. Each voxel that the geometry touches or that is
 /// next to such a one gets rays_per_voxel; up to 16 times as many where almost nothing gets through, and where there
-/// are few voxels. Of the voxels fainter than kFaintestDepth only a random share is kept, with that depth, so that on
-/// average nothing is lost. The lattice's origin is in the space of geometry.positions. Empty geometry gives an empty
+/// are few voxels. Each voxel is measured alone: what rays see of all together comes later (measure_volume.h). The
+/// lattice's origin is in the space of geometry.positions. Empty geometry gives an empty
 /// volume. The result does not depend on the number of threads. Errors: Cancelled; InvalidArgument (options, or
 /// geometry further than about a million voxels from the origin); Io (out of memory in Embree).
 Result<SparseVolume> voxelize(const Surface& geometry, const VoxelLattice& lattice, const VoxelizeOptions& options);
+
+/// The same for a surface whose scene is there already.
+Result<SparseVolume> voxelize(const OpacityScene& geometry, const VoxelLattice& lattice,
+                              const VoxelizeOptions& options);
 
 /// The number of bricks that voxelize() looks at, some of which turn out empty. Fast: no ray is cast.
 uint64_t candidate_bricks(const Surface& geometry, const VoxelLattice& lattice);
@@ -76,8 +78,9 @@ struct VolumeSize {
   uint64_t bricks = 0;
 };
 
-/// About what voxelize() would give, from every 32nd brick: within a few percent for large volumes, and in a thirtieth
-/// of the time. Small volumes are not worth an estimate: 0. Arguments and errors as for voxelize().
+/// About what voxelize() and thin_out() would give, from every 32nd brick: within a few percent for large volumes, and
+/// in a thirtieth of the time. Long lines leave fewer voxels: three quarters or more. Small volumes are not worth an
+/// estimate: 0. Arguments and errors as for voxelize().
 Result<VolumeSize> estimate_volume(const Surface& geometry, const VoxelLattice& lattice,
                                    const VoxelizeOptions& options);
 

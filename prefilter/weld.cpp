@@ -45,11 +45,12 @@ uint64_t cell_key(const glm::i64vec3& cell) {
 }
 
 /// Output vertices by exact position, in order of first use.
-WeldResult weld_exactly(std::span<const vec3> positions, std::span<const uint32_t> corner_vertex) {
+WeldResult weld_exactly(std::span<const vec3> positions, std::span<const uint32_t> corner_vertex, const Job& job) {
   WeldResult result;
   result.vertex_of.assign(positions.size(), kNoIndex);
   VertexTable table(positions.size());
   for (const uint32_t vertex : corner_vertex) {
+    if (job.is_cancelled()) break;
     uint32_t& target = result.vertex_of[vertex];
     if (target != kNoIndex) continue;
     const uint64_t key = position_key(positions[vertex]);
@@ -126,8 +127,9 @@ class NearWelder {
 }  // namespace
 
 WeldResult weld(std::span<const vec3> positions, std::span<const uint32_t> face_begin,
-                std::span<const uint32_t> corner_vertex) {
-  WeldResult result = weld_exactly(positions, corner_vertex);
+                std::span<const uint32_t> corner_vertex, const Job& job) {
+  WeldResult result = weld_exactly(positions, corner_vertex, job);
+  if (job.is_cancelled()) return result;
   Box3 bounds;
   for (const vec3& p : result.positions) bounds.extend(p);
   const float near = kNearOfBounds * max_component(bounds.size());
@@ -137,7 +139,7 @@ WeldResult weld(std::span<const vec3> positions, std::span<const uint32_t> face_
   NearWelder welder(result.positions, tolerance, near);
   std::vector<uint32_t> merged(result.positions.size());
   std::vector<vec3> kept;
-  for (uint32_t v = 0; v < merged.size(); ++v) {
+  for (uint32_t v = 0; v < merged.size() && !job.is_cancelled(); ++v) {
     const uint32_t target = welder.find_or_insert(v);
     if (target == v) {
       merged[v] = static_cast<uint32_t>(kept.size());

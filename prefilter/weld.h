@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/index.h"
+#include "base/job.h"
 #include "base/vec.h"
 
 namespace farfield {
@@ -20,8 +21,8 @@ struct WeldResult {
 /// Joins vertices with equal positions (-0 equals 0), then those closer than 1e-6 of the bounds' longest side and also
 /// closer than 1 % of the shortest edge at either of them, so that fine detail in a large mesh never collapses.
 /// Vertices that no face uses are dropped. Face i has the corners face_begin[i] .. face_begin[i + 1] - 1. Positions
-/// must be finite.
+/// must be finite. Once the job is cancelled it returns at once, with a result of no use.
 WeldResult weld(std::span<const vec3> positions, std::span<const uint32_t> face_begin,
-                std::span<const uint32_t> corner_vertex);
+                std::span<const uint32_t> corner_vertex, const Job& job = {});
 
 }  // namespace farfield

@@ -88,7 +88,12 @@ py::dict bake_arrays(const std::string& folder, const std::string& name, const p
   for (const auto& mesh : meshes) input.meshes.push_back(to_mesh(mesh.cast<py::dict>(), arrays));
   for (const auto& instance : instances) input.instances.push_back(to_instance(instance.cast<py::tuple>()));
   if (py::isinstance<py::function>(materials)) {
-    input.material_function = to_material_function(materials.cast<py::function>(), call);
+    auto function = materials.cast<py::function>();
+    if (takes_batches(function)) {
+      input.material_batch_function = to_material_batch(std::move(function), call);
+    } else {
+      input.material_function = to_material_function(std::move(function), call);
+    }
     input.material_key = material_key;
   } else {
     for (const auto& material : materials.cast<py::list>())

@@ -4,9 +4,11 @@
 #include <pybind11/stl.h>
 
 #include <array>
+#include <cstring>
 #include <functional>
 #include <map>
 #include <memory>
+#include <type_traits>
 
 namespace farfield::python {
 namespace {
@@ -130,6 +132,31 @@ MaterialSample to_sample(const py::object& answer) {
   return sample;
 }
 
+/// A function that copies of a std::function share. They are made and dropped without the GIL: of the pointer, whose
+/// last one takes it.
+std::shared_ptr<py::function> share(py::function function) {
+  return {new py::function(std::move(function)), [](py::function* f) {
+            const py::gil_scoped_acquire gil;
+            delete f;
+          }};
+}
+
+template <typename T>
+py::array_t<T> column_of(const MaterialQuery* queries, size_t count, T MaterialQuery::*member) {
+  py::array_t<T> column(static_cast<py::ssize_t>(count));
+  for (size_t i = 0; i < count; ++i) column.mutable_data()[i] = queries[i].*member;
+  return column;
+}
+
+template <int N>
+py::array_t<float> column_of(const MaterialQuery* queries, size_t count, glm::vec<N, float> MaterialQuery::*member) {
+  py::array_t<float> column({static_cast<py::ssize_t>(count), py::ssize_t{N}});
+  for (size_t i = 0; i < count; ++i) {
+    for (int k = 0; k < N; ++k) column.mutable_data()[N * i + static_cast<size_t>(k)] = (queries[i].*member)[k];
+  }
+  return column;
+}
+
 template <int N>
 py::tuple to_tuple(const glm::vec<N, float>& v) {
   py::tuple out(N);
@@ -145,13 +172,17 @@ BakeMaterial to_material(const py::dict& values, KeptArrays& arrays) {
   return material;
 }
 
+bool takes_batches(const py::function& function) { return function.attr("batched").cast<bool>(); }
+
 MaterialFunction to_material_function(py::function function, LongCall& call) {
-  // Copies are made without the GIL: of the pointer, which the last one drops with it.
-  std::shared_ptr<py::function> shared(new py::function(std::move(function)), [](py::function* f) {
-    const py::gil_scoped_acquire gil;
-    delete f;
-  });
-  return [shared, &call](const MaterialQuery& query) {
+  if (takes_batches(function)) {
+    return [batch = to_material_batch(std::move(function), call)](const MaterialQuery& query) {
+      MaterialSample sample;
+      batch(&query, &sample, 1);
+      return sample;
+    };
+  }
+  return [shared = share(std::move(function)), &call](const MaterialQuery& query) {
     MaterialSample sample;
     call.call_python([&] {
       try {
@@ -162,6 +193,24 @@ MaterialFunction to_material_function(py::function function, LongCall& call) {
       }
     });
     return sample;
+  };
+}
+
+MaterialBatchFunction to_material_batch(py::function function, LongCall& call) {
+  return [shared = share(std::move(function)), &call](const MaterialQuery* queries, MaterialSample* samples,
+                                                      size_t count) {
+    call.call_python([&] {
+      const auto column = [&](auto member) { return column_of(queries, count, member); };
+      using Q = MaterialQuery;
+      const py::object answer =
+          (*shared)(count, column(&Q::material), column(&Q::face), column(&Q::uv), column(&Q::duv_dx),
+                    column(&Q::duv_dy), column(&Q::color), column(&Q::opacity_only));
+      const auto rows = answer.cast<py::array_t<float, py::array::c_style | py::array::forcecast>>();
+      constexpr size_t kNumbers = sizeof(MaterialSample) / sizeof(float);  // farfield/_arrays.py has their order
+      static_assert(kNumbers == 17 && std::is_trivially_copyable_v<MaterialSample>);
+      if (static_cast<size_t>(rows.size()) != kNumbers * count) throw py::value_error("not a row of numbers per place");
+      std::memcpy(static_cast<void*>(samples), rows.data(), count * sizeof(MaterialSample));
+    });
   };
 }
 

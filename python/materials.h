@@ -22,6 +22,13 @@ BakeMaterial to_material(const py::dict& fields, KeptArrays& arrays);
 /// MaterialSample's fields. `call` outlives it.
 MaterialFunction to_material_function(py::function function, LongCall& call);
 
+/// A MaterialBatchFunction that asks a Python function for many places in one call: it gets their number and arrays of
+/// material, face, uv, duv_dx, duv_dy, color and opacity_only, and returns MaterialSample's numbers, a row per place.
+MaterialBatchFunction to_material_batch(py::function function, LongCall& call);
+
+/// Which of the two a function of farfield/_arrays.py is for.
+bool takes_batches(const py::function& function);
+
 void define_materials(py::module_& module);
 
 }  // namespace farfield::python

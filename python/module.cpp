@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // farfield._farfield: what farfield/__init__.py calls. Errors are raised as farfield.Error.
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
 
 #include "cache/manifest.h"
 #include "evaluate/evaluate.h"
@@ -57,7 +58,7 @@ std::string evaluate_asset(const std::string& folder, const std::string& source,
 
 void raise(const Error& error) {
   const py::object type = py::module_::import("farfield._errors").attr("Error");
-  const py::object value = type(error.message, name_of(error.code));
+  const py::object value = type(error.message, name_of(error.code), error.warnings);
   PyErr_SetObject(type.ptr(), value.ptr());
   throw py::error_already_set();
 }

@@ -11,9 +11,13 @@ namespace farfield {
 namespace {
 
 constexpr float kLongestStretch = 16;  // of a footprint at grazing angles
-// The share of a ray's width over which masks are averaged. Averages over whole cones forget which leaf hides which,
-// and crowns of leaf cards darken by 2 % (docs/results/cycles.md). Smaller shares page in finer texels.
-constexpr float kOutlineShare = 0.0625f;
+// The share of a ray's width over which maps are averaged: a pixel has many rays, and MIP levels of an atlas mix what
+// lies side by side there only. Over whole widths a cow's hooves turn as white as the margin around them, and it is 3 %
+// too bright at 16 pixels, 6 % at 8 (docs/results/textures.md). Smaller shares page in finer texels.
+constexpr float kMapShare = 0.25f;
+// The same for masks. Averages over whole cones forget which leaf hides which, and crowns of leaf cards darken by 2 %
+// (docs/results/cycles.md).
+constexpr float kMaskShare = 0.0625f;
 constexpr float kUnevenLengths = 0.01f;  // normals in files are rounded: no spread
 
 /// Between a face's corners; at(i) gives shading vertex i.
@@ -127,7 +131,7 @@ CloseUp::CloseUp(const std::filesystem::path& folder, const Manifest& manifest, 
 
 float CloseUp::opacity(const LevelView& level, const SurfacePoint& point) const {
   SurfacePoint narrow = point;
-  narrow.width *= kOutlineShare;
+  narrow.width *= kMaskShare;
   const Place place(level, narrow);
   std::optional<float> opacity;
   if (function_) {
@@ -139,7 +143,9 @@ float CloseUp::opacity(const LevelView& level, const SurfacePoint& point) const 
 }
 
 CloseUpSample CloseUp::sample(const LevelView& level, const SurfacePoint& point) const {
-  const Place place(level, point);
+  SurfacePoint narrow = point;
+  narrow.width *= kMapShare;
+  const Place place(level, narrow);
   CloseUpSample out{place.at, {}};
   if (function_) {
     out.material = ask_host(place, false);

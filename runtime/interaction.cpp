@@ -78,27 +78,23 @@ SurfaceParams face_params(const LevelView& level, uint32_t face) {
   return params;
 }
 
-/// The normal around which a distribution with a main direction lies, and how far it spreads: like the roughness2 of a
-/// GGX lobe. Nothing for one without (docs/decisions/0011).
-struct NarrowNormals {
+/// The normal around which a distribution lies, and how far it spreads: like the roughness2 of a GGX lobe
+/// (docs/decisions/0011).
+struct MainNormal {
   vec3 normal;
   float roughness2;
 };
-std::optional<NarrowNormals> narrow_normals(const SymMat3& s, const vec3& start) {
-  constexpr float kNarrow = 0.55f;  // of the trace
+MainNormal main_normal(const SymMat3& s, const vec3& start) {
   const float trace = s.trace();
-  if (!(trace > 0)) return {};
   vec3 normal = start;
-  for (int i = 0; i < 4; ++i) {  // power iterations: rough only where a second direction is nearly as strong
+  for (int i = 0; i < 4; ++i) {  // power iterations: where a second direction is as strong, `start` has a say
     const vec3 next = s * normal;
     const float length = glm::length(next);
-    if (!(length > 1e-6f * trace)) return {};
+    if (!(length > 1e-6f * trace)) return {start, 1.0f};
     normal = next / length;
   }
-  const float along = s.quadratic(normal) / trace;
-  if (!(along >= kNarrow)) return {};
-  const float aside = 0.5f * std::max(1 - along, 0.0f);
-  return NarrowNormals{normal, roughness2_of_spread(aside)};
+  const float aside = 0.5f * std::clamp(1 - s.quadratic(normal) / trace, 0.0f, 2.0f / 3);
+  return {normal, roughness2_of_spread(aside)};
 }
 
 /// On wo's side of the surface, and not beyond its own horizon.
@@ -174,23 +170,17 @@ SurfaceParams shade_surface(const TracedLevel& level, const InstanceRecord& inst
   SurfaceParams params = face_params(view, face);
   interaction.emission = emission_at(view.face_emission, face);
   vec3 normal = interaction.geometric_normal;
-  bool is_flat = true;
   if (level.look) {
     const vec3 local = instance.vector_to_local(world_direction);
     const float width = hit.footprint * glm::length(local) / glm::length(world_direction);
     const vec2 barycentric(hit.barycentric[0], hit.barycentric[1]);
     normal = look_closely(level, {quad, face, barycentric, local, width}, instance, normal, interaction, params);
   } else if (!view.face_sggx.empty()) {
-    params.sggx = to_world(unpack(view.face_sggx[face]), instance);
-    if (const auto narrow = narrow_normals(params.sggx, normal)) {
-      normal = narrow->normal;
-      params.roughness2 = std::min(params.roughness2 + narrow->roughness2, 1.0f);
-    } else {
-      is_flat = false;
-    }
+    const MainNormal main = main_normal(to_world(unpack(view.face_sggx[face]), instance), normal);
+    normal = main.normal;
+    params.roughness2 = std::min(params.roughness2 + main.roughness2, 1.0f);
   }
   interaction.shading_normal = visible_normal(normal, interaction.geometric_normal, interaction.wo);
-  if (is_flat) params.sggx = SymMat3::outer(interaction.shading_normal);
   return params;
 }
 
@@ -233,6 +223,7 @@ Interaction make_interaction(const TracedLevel& level, const InstanceRecord& ins
   interaction.albedo = layered_albedo(params.specular, params.diffuse + params.transmission);
   InteractionModel::put(interaction,
                         InteractionModel(SurfaceBsdf(params, interaction.shading_normal, interaction.wo),
+                                         HorizonLobe(params, interaction.shading_normal, interaction.geometric_normal),
                                          ray_offset(instance, origin, interaction.position, view.header.bounds)));
   return interaction;
 }
@@ -247,21 +238,36 @@ ScatterSample Interaction::sample(Rng& rng) const {
   if (kind == Kind::None) return {};
   const InteractionModel& model = InteractionModel::of(*this);
   if (kind == Kind::Volume) return model.flakes.sample(rng);
-  ScatterSample sample = model.surface.sample(rng);
-  if (!is_on_one_side(*this, sample.wi)) sample.weight = vec3(0.0f);
+  const HorizonLobe& horizon = model.horizon;
+  if (!(horizon.chance > 0)) return model.surface.sample(rng);
+  ScatterSample sample;
+  if (rng.next() < horizon.chance) {
+    const float side = rng.next(), u1 = rng.next(), u2 = rng.next();
+    sample.wi = horizon.sample(side, u1, u2);
+  } else {
+    sample = model.surface.sample(rng);
+    if (!(sample.pdf > 0)) return {};
+  }
+  sample.pdf = pdf(sample.wi);
+  sample.weight = sample.pdf > 0 ? eval(sample.wi, rng) / sample.pdf : vec3(0.0f);
   return sample;
 }
 
 glm::vec3 Interaction::eval(const glm::vec3& wi, Rng& rng) const {
-  if (kind == Kind::None || (kind == Kind::Surface && !is_on_one_side(*this, wi))) return vec3(0.0f);
+  if (kind == Kind::None) return vec3(0.0f);
   const InteractionModel& model = InteractionModel::of(*this);
-  return kind == Kind::Surface ? model.surface.eval(wi, rng) : model.flakes.eval(wi, rng);
+  if (kind == Kind::Volume) return model.flakes.eval(wi, rng);
+  const vec3 value = is_on_one_side(*this, wi) ? model.surface.eval(wi) : vec3(0.0f);
+  return model.horizon.chance > 0 ? value + model.horizon.eval(wi) : value;
 }
 
 float Interaction::pdf(const glm::vec3& wi) const {
   if (kind == Kind::None) return 0.0f;
   const InteractionModel& model = InteractionModel::of(*this);
-  return kind == Kind::Surface ? model.surface.pdf(wi) : model.flakes.pdf(wi);
+  if (kind == Kind::Volume) return model.flakes.pdf(wi);
+  const float chance = model.horizon.chance;
+  const float density = (1 - chance) * model.surface.pdf(wi);
+  return chance > 0 ? density + chance * model.horizon.pdf(wi) : density;
 }
 
 float Interaction::next_cone_spread(const ScatterSample& sample, float cone_spread) const {

@@ -6,6 +6,7 @@
 #include "bvh/traced_asset.h"
 #include "farfield/interaction.h"
 #include "scattering/flake_phase.h"
+#include "scattering/horizon_lobe.h"
 #include "scattering/surface_bsdf.h"
 
 namespace farfield {
@@ -26,9 +27,11 @@ struct InteractionModel {
     SurfaceBsdf surface;  ///< Kind::Surface
     FlakePhase flakes;    ///< Kind::Volume
   };
-  float offset = 0;  ///< how far off the surface rays start, world units
+  HorizonLobe horizon;  ///< Kind::Surface
+  float offset = 0;     ///< how far off the surface rays start, world units
 
-  InteractionModel(const SurfaceBsdf& bsdf, float ray_offset) : surface(bsdf), offset(ray_offset) {}
+  InteractionModel(const SurfaceBsdf& bsdf, const HorizonLobe& lobe, float ray_offset)
+      : surface(bsdf), horizon(lobe), offset(ray_offset) {}
   explicit InteractionModel(const FlakePhase& phase) : flakes(phase) {}
 
   static const InteractionModel& of(const Interaction& interaction);

@@ -7,13 +7,13 @@
 //   A E_m[ f_m(wo, wi) |wi.m| ] + (1 - A) albedo_ms sigma(wi) / (4 pi R_G)
 //
 // f_m is the BRDF (and transmission) of a flat surface with normal m and the voxel's reflectance: a flake scatters as
-// the piece of surface that it stands for, grazing and masking losses included (docs/decisions/0007).
-// With a = mean F + (1 - mean F)(diffuse + transmission), what a flake reflects of light from everywhere, albedo_ms =
-// a cluster_albedo(a, A) (scattering/albedo.h): light that meets another flake close by is coloured again. The
-// thesis stores albedo_ms per voxel instead (14.1.16); this needs no bytes and keeps white white.
+// the piece of surface that it stands for (docs/decisions/0007). With a = R + (1 - R)(diffuse + transmission), what a
+// flake returns of light from everywhere, R by its highlight, albedo_ms = a cluster_albedo(a, A) (scattering/albedo.h):
+// light that meets another flake close by is coloured again. The thesis stores albedo_ms per voxel instead (14.1.16);
+// this needs no bytes and keeps white white.
 //
 // Reciprocal in the sense of anisotropic media, sigma(wo) f(wo, wi) = sigma(wi) f(wi, wo); the integral over wi is at
-// most 1, and exactly 1 where diffuse + transmission = 1 and specular = 0.
+// most 1, and 1 where diffuse + transmission = 1.
 #pragma once
 
 #include "base/random.h"
@@ -64,7 +64,7 @@ class FlakeModel {
   /// What only specular flakes need.
   struct Specular {
     CholeskyFactor<float> facets;  ///< of specular_sggx(sggx, roughness2), for pdf()
-    vec3 f0{0.0f};                 ///< 0: these flakes have no specular lobe
+    vec3 f0{0.0f};                 ///< 0: these flakes have no highlight
     float roughness2 = 1;
   };
   /// What only self-shadowing needs.
@@ -78,10 +78,10 @@ class FlakeModel {
     float specular = 0, diffuse = 0, transmission = 0, multiple = 0;
   };
 
-  using Flake = SurfaceModel<kChannels & kFlatChannels>;
+  using Flake = SurfaceModel<kChannels & kSurfaceChannels>;
 
   vec3 set_up_specular(const FlakeParams& params, const SymMat3& s) requires(kHasSpecular);
-  void set_up_multiple(const FlakeParams& params, const SymMat3& s, const vec3& mean_fresnel) requires(kHasMultiple);
+  void set_up_multiple(const FlakeParams& params, const SymMat3& s, const vec3& highlight) requires(kHasMultiple);
   float single_share() const;
   bool scatters_once() const { return chances_.specular + chances_.diffuse + chances_.transmission > 0; }
   Flake sample_flake(Rng& rng) const;

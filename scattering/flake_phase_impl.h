@@ -7,7 +7,7 @@
 
 #include "scattering/albedo.h"
 #include "scattering/carlson.h"
-#include "scattering/fresnel.h"
+#include "scattering/highlight.h"
 
 #include <limits>
 
@@ -19,9 +19,6 @@ inline constexpr float kSmallestSpread = 0.01f;
 
 /// Smaller A is taken as this one: white flakes must not divide 0 by 0.
 inline constexpr float kLeastSelfShadowing = 1e-4f;
-
-/// The cosine-weighted mean of Schlick's Fresnel.
-inline vec3 mean_schlick(const vec3& f0, float f90) { return f0 + (vec3(f90) - f0) * (1.0f / 21); }
 
 /// S at unit trace, so that no scale under- or overflows; isotropic for an empty or broken S.
 inline SymMat3 usable_sggx(const SymMat3& s) {
@@ -60,25 +57,24 @@ FlakeModel<kChannels>::FlakeModel(const FlakeParams& params, const vec3& wo) : w
     transmission_ = clamp_albedo(params.transmission), chances_.transmission = max_component(transmission_);
   }
   if constexpr (kHasDiffuse && kHasTransmission) limit_sum(diffuse_, transmission_);
-  [[maybe_unused]] vec3 mean_fresnel(0.0f);
-  if constexpr (kHasSpecular) mean_fresnel = set_up_specular(params, s);
-  if constexpr (kHasMultiple) set_up_multiple(params, s, mean_fresnel);
+  [[maybe_unused]] vec3 highlight(0.0f);
+  if constexpr (kHasSpecular) highlight = set_up_specular(params, s);
+  if constexpr (kHasMultiple) set_up_multiple(params, s, highlight);
 
   const float single = chances_.specular + chances_.diffuse + chances_.transmission;
   const float share = single > 0 ? single_share() / single : 0.0f;
   chances_.specular *= share, chances_.diffuse *= share, chances_.transmission *= share;
 }
 
-// Returns the mean reflectance of the specular lobe.
+// Returns what the highlight gives back of light from everywhere.
 template <unsigned kChannels>
 vec3 FlakeModel<kChannels>::set_up_specular(const FlakeParams& params, const SymMat3& s) requires(kHasSpecular) {
-  const vec3 f0 = clamp_albedo(params.specular);
-  const float f90 = grazing_reflectance(f0);
-  if (!(f90 > 0)) return vec3(0.0f);
   const float roughness2 = params.roughness2 < 1.0f ? std::max(params.roughness2, 0.0f) : 1.0f;
-  specular_ = {cholesky(specular_sggx(s, roughness2)), f0, roughness2};
+  const Highlight highlight(params.specular, roughness2);
+  if (!highlight.exists()) return vec3(0.0f);
+  specular_ = {cholesky(specular_sggx(s, roughness2)), clamp_albedo(params.specular), roughness2};
 
-  const vec3 mean = detail::mean_schlick(f0, f90);
+  const vec3 mean = highlight.mean_albedo();
   const float left = 1.0f - min_component(mean);
   chances_.specular = max_component(mean);
   chances_.diffuse *= left, chances_.transmission *= left;
@@ -87,13 +83,13 @@ vec3 FlakeModel<kChannels>::set_up_specular(const FlakeParams& params, const Sym
 
 template <unsigned kChannels>
 void FlakeModel<kChannels>::set_up_multiple(const FlakeParams& params, const SymMat3& s,
-                                            const vec3& mean_fresnel) requires(kHasMultiple) {
+                                            const vec3& highlight) requires(kHasMultiple) {
   if (!(params.self_shadowing < 1)) return;
   vec3 base(0.0f);
   if constexpr (kHasDiffuse) base += diffuse_;
   if constexpr (kHasTransmission) base += transmission_;
   const float a = std::max(params.self_shadowing, detail::kLeastSelfShadowing);
-  const vec3 albedo = mean_fresnel + (vec3(1.0f) - mean_fresnel) * base;
+  const vec3 albedo = layered_albedo(highlight, base);
   multiple_.albedo = albedo * cluster_albedo(albedo, a);
   if (!(max_component(multiple_.albedo) > 0)) return;
   const vec3 eigen(eigenvalues(s));
@@ -114,7 +110,6 @@ typename FlakeModel<kChannels>::Flake FlakeModel<kChannels>::sample_flake(Rng& r
   const float u1 = rng.next(), u2 = rng.next();
   const vec3 m = Sggx(flakes_).sample_visible(wo_, u1, u2);
   SurfaceParams params;
-  params.sggx = SymMat3::outer(m);
   if constexpr (kHasDiffuse) params.diffuse = diffuse_;
   if constexpr (kHasTransmission) params.transmission = transmission_;
   if constexpr (kHasSpecular) params.specular = specular_.f0, params.roughness2 = specular_.roughness2;
@@ -124,7 +119,7 @@ typename FlakeModel<kChannels>::Flake FlakeModel<kChannels>::sample_flake(Rng& r
 template <unsigned kChannels>
 vec3 FlakeModel<kChannels>::eval(const vec3& wi, [[maybe_unused]] Rng& rng) const {
   vec3 value(0.0f);
-  if (scatters_once()) value = single_share() * sample_flake(rng).eval(wi, rng);
+  if (scatters_once()) value = single_share() * sample_flake(rng).eval(wi);
   if constexpr (kHasMultiple) {
     value += multiple_.share * multiple_.norm * Sggx(flakes_).sigma(wi) * multiple_.albedo;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fresnel reflectance, of one facet and in the mean over the facets that a direction sees.
+// Fresnel reflectance of one facet.
 #pragma once
 
 #include "base/vec.h"
@@ -39,24 +39,5 @@ inline float fresnel_conductor(float cos, float eta, float k) {
   const float t3 = cos2 * a2_b2 + sin2 * sin2, t4 = 2.0f * a * cos * sin2;
   return 0.5f * across * (1.0f + (t3 - t4) / (t3 + t4));
 }
-
-/// The mean of (1 - w.m)^5 over the GGX facets m visible from w: with it, F0 + (F90 - F0) mean is the part of the light
-/// from w that meets the specular lobe, masked or not. What is left is there for a diffuse lobe underneath
-/// [Kelemen and Szirmay-Kalos 2001]. From a table, absolute error below 0.02 (at grazing angles); a value, cheap to
-/// copy. Immutable; any thread.
-class VisibleFresnel {
- public:
-  /// alpha: GGX roughness, clamped to [0, 1]. The first call ever computes the table (some 10 ms).
-  explicit VisibleFresnel(float alpha);
-  /// cos: between w and the surface normal, clamped to [0, 1].
-  float grazing_share(float cos) const;
-  /// The mean of grazing_share over cosine-weighted directions, exactly.
-  float mean_grazing_share() const;
-
- private:
-  const struct VisibleFresnelRow* low_;  ///< the rows of the table around alpha
-  const struct VisibleFresnelRow* high_;
-  float blend_;
-};
 
 }  // namespace farfield

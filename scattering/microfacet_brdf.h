@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The BRDF lobes of ellipsoid microfacets, for any Fresnel function and either masking (thesis 8.3.9-8.3.11 with the
+// The specular lobe of ellipsoid microfacets, for any Fresnel function and either masking (thesis 8.3.9-8.3.11 with the
 // erratum of docs/theory.md, section 5: G1 in the denominator is the unclamped one, or nothing is reciprocal).
 // cos_o = n.wo > 0, cos_i = n.wi. Values are f |cos_i|.
 #pragma once
@@ -27,20 +27,6 @@ T specular_facets_pdf(const BasicMicrofacets<T>& facets, const Vec3<T>& wo, cons
   const T area_o = facets.projected_area(wo);
   if (!(glm::dot(h, wo) > 0) || !(glm::dot(h, n) > 0) || !(area_o > 0)) return 0;
   return facets.ndf(h) / (T(4) * area_o);
-}
-
-/// Diffuse facets of albedo 1: the estimate from one facet m visible from wo, <wi.m> G2 / (pi G1u(wo)). With cos_i < 0,
-/// diffuse transmission: the same facets seen from behind, where masking is independent of that on our side.
-template <Masking kMasking, typename T>
-T eval_diffuse_facet(const BasicMicrofacets<T>& facets, const Vec3<T>& wo, T cos_o, const Vec3<T>& wi, T cos_i,
-                     const Vec3<T>& m) {
-  const bool through = cos_i < 0;
-  const T cos_facet = through ? -glm::dot(m, wi) : glm::dot(m, wi);
-  const T area_o = facets.projected_area(wo);
-  if (!(cos_facet > 0) || !(area_o > 0)) return 0;
-  const T weight = through ? masking_weight<Masking::Separable>(cos_o, area_o, -cos_i, facets.projected_area(-wi))
-                           : masking_weight<kMasking>(cos_o, area_o, cos_i, facets.projected_area(wi));
-  return cos_facet * weight / kPiOf<T>;
 }
 
 }  // namespace farfield

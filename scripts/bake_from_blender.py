@@ -298,6 +298,8 @@ def main():
             name=Path(bpy.data.filepath).name or "untitled.blend", finest_grid=arguments.finest_grid,
             rays_per_voxel=arguments.rays_per_voxel, memory_limit=arguments.memory_limit << 20)
     except (farfield.Error, ValueError) as failure:
+        for warning in getattr(failure, "warnings", []):
+            warn(warning)
         sys.exit(f"bake_from_blender: {failure}")
     for warning in report["warnings"]:
         warn(warning)

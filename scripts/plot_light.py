@@ -77,14 +77,11 @@ def plot_furnace():
     data = rows("furnace")
     figure, axes = plt.subplots(1, 3, figsize=(13, 4), sharey=True)
     for axis, surface in zip(axes, ("diffuse", "plastic", "metal")):
-        for spread, style in (("0", "-"), ("0.05", "--"), ("0.3", ":")):
-            for roughness2, color in (("0.01", "C0"), ("0.1", "C1"), ("0.5", "C2")):
-                if surface == "diffuse" and roughness2 != "0.01":
-                    continue
-                part = [r for r in data if (r["surface"], r["spread"], r["roughness2"]) == (surface, spread, roughness2)]
-                label = f"bumps {spread}" if surface == "diffuse" else f"bumps {spread}, alpha^2 {roughness2}"
-                axis.plot([float(r["cos"]) for r in part], [float(r["albedo"]) for r in part], style, color=color,
-                          label=label)
+        for roughness2 in ("0.01", "0.1", "0.5"):
+            if surface == "diffuse" and roughness2 != "0.01":
+                continue
+            part = [r for r in data if (r["surface"], r["roughness2"]) == (surface, roughness2)]
+            axis.plot([float(r["cos"]) for r in part], [float(r["albedo"]) for r in part], label=f"alpha^2 {roughness2}")
         axis.set_title({"diffuse": "diffuse 1", "plastic": "diffuse 1 under F0 = 0.04", "metal": "F0 = 1"}[surface])
         axis.set_xlabel("cosine of the view")
         axis.grid(True, alpha=0.3)

@@ -88,6 +88,7 @@ int run(int argc, char** argv) {
 
   const Result<void> result = action();
   if (result) return 0;
+  tool::print_warnings(app.get_subcommands().front()->get_name(), result.error().warnings);
   const bool is_interrupted = result.error().code == ErrorCode::Cancelled;
   fmt::print(stderr, "{}: {}\n", name_of_command(app),
              is_interrupted ? "interrupted" : tool::one_line(result.error().message));

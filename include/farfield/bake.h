@@ -151,6 +151,8 @@ struct BakeInput {
   /// at once. Faces are numbered on from mesh to mesh, in the order of the instances. The same function goes to
   /// Runtime::open_asset(), unless the host shades level 0 by itself (docs/materials.md).
   MaterialFunction material_function;
+  /// In place of material_function: asked for many places at once, up to some ten thousand.
+  MaterialBatchFunction material_batch_function;
   /// Stands for the answers of material_function: a bake of the same input under the same key is taken as the same.
   /// Empty: whether there is something to do cannot be told, so every call bakes.
   std::string material_key;

@@ -54,8 +54,9 @@ class FARFIELD_API Interaction {
   glm::vec3 ray_origin(const glm::vec3& wi) const;
   /// Draws wi. The number of values taken from rng varies.
   ScatterSample sample(Rng& rng) const;
-  /// Surfaces: BRDF (and transmission) times |cos| to the shading normal, 0 for directions that are not on the same
-  /// side of both normals; volumes: albedo times phase function. Linear RGB per steradian. For diffuse microfacets an
+  /// Surfaces: BRDF (and transmission) times |cos| to the shading normal, for directions that are on the same side of
+  /// both normals; the diffuse light that the others would get goes out around the geometric normal, so that white
+  /// stays white. Volumes: albedo times phase function. Linear RGB per steradian. For diffuse microfacets an
   /// unbiased one-sample estimate: rng supplies the sample.
   glm::vec3 eval(const glm::vec3& wi, Rng& rng) const;
   /// For multiple importance sampling, per steradian. Surfaces: the density with which sample() draws wi. Volumes: a

@@ -2,6 +2,7 @@
 // What a surface is made of, asked of the host: one function serves the bake and the close-ups (level 0).
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
@@ -33,5 +34,9 @@ struct MaterialSample {
 /// The host's materials. Called from any thread, at the same time; the same query must get the same answer. Must not
 /// throw.
 using MaterialFunction = std::function<MaterialSample(const MaterialQuery&)>;
+
+/// The same for many places in one call, for hosts to whom a call is dear: samples[i], as constructed, becomes the
+/// answer to queries[i]. How a bake divides its questions into calls does not change with threads.
+using MaterialBatchFunction = std::function<void(const MaterialQuery* queries, MaterialSample* samples, size_t count)>;
 
 }  // namespace farfield

@@ -5,6 +5,7 @@
 #include <string>
 #include <tl/expected.hpp>
 #include <utility>
+#include <vector>
 
 namespace farfield {
 
@@ -23,6 +24,7 @@ enum class ErrorCode {
 struct Error {
   ErrorCode code;
   std::string message;
+  std::vector<std::string> warnings = {};  ///< what was noticed on the way to it, one line each: often why
 };
 
 /// Either a value or an Error. Never throws unless value() is called on an error.
@@ -31,7 +33,7 @@ using Result = tl::expected<T, Error>;
 
 /// Makes the error side of a Result.
 inline tl::unexpected<Error> make_error(ErrorCode code, std::string message) {
-  return tl::unexpected<Error>(Error{code, std::move(message)});
+  return tl::unexpected<Error>(Error{code, std::move(message), {}});
 }
 
 }  // namespace farfield

@@ -14,7 +14,11 @@
 //   farfield::RayContext context;  // per ray
 //   context.cone_spread = pixel_spread;
 //   rtcIntersect1(scene, &context.embree, &ray_hit);
-//   if (ray_hit.hit.geomID == geometry) throughput *= runtime->interaction(ray_hit, context).sample(rng).weight;
+//   if (ray_hit.hit.geomID == geometry) {
+//     farfield::Interaction hit = runtime->interaction(ray_hit, context);
+//     radiance += throughput * hit.emission;
+//     throughput *= hit.sample(rng).weight;
+//   }
 //
 // value() throws what went wrong; hosts that go on without look at the Result. A test compiles these lines.
 #pragma once

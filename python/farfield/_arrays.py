@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Sequence
 
 import numpy as np
@@ -124,12 +126,63 @@ def material(fields: dict[str, Any]) -> dict[str, Any]:
     return out
 
 
+@dataclass(frozen=True)
+class MaterialQueries:
+    """Places on surfaces of the source, as a batched material function is asked for them: a row per place."""
+
+    material: Array  # (n,): the ids that the faces carry
+    face: Array  # (n,): numbers of the faces, in the order in which the source has them
+    uv: Array  # (n, 2): v points down the image; NaN where there are none
+    duv_dx: Array  # (n, 2): half-axis of the footprint in uv
+    duv_dy: Array  # (n, 2): the other half-axis
+    color: Array  # (n, 4): vertex colour, linear RGBA
+    opacity_only: Array  # (n,): nothing but the answer's opacity will be looked at
+
+    def __len__(self) -> int:
+        return len(self.material)
+
+
+# Where a sample's fields lie in a row, and what they are when nothing is said: MaterialSample of farfield/material.h.
+_SAMPLE = {"diffuse": (slice(0, 3), 0.8), "specular": (slice(3, 6), 0), "transmission": (slice(6, 9), 0),
+           "roughness": (9, 1), "opacity": (10, 1), "normal": (slice(11, 14), (0, 0, 1)), "emission": (slice(14, 17), 0)}
+
+
+def _samples(answer: Any, count: int) -> Array:
+    if not isinstance(answer, Mapping):
+        raise ValueError(f"a material function returns a dictionary, not {answer!r}")
+    rows_ = np.empty((count, 17), np.float32)
+    for columns, default in _SAMPLE.values():
+        rows_[:, columns] = default
+    for name, value in answer.items():
+        if name not in _SAMPLE:
+            raise ValueError(f"a material sample has no '{name}'; there are: {', '.join(sorted(_SAMPLE))}")
+        try:
+            rows_[:, _SAMPLE[name][0]] = value
+        except (TypeError, ValueError):
+            raise ValueError(f"a material sample: '{name}' of {count} places cannot have the shape {np.shape(value)}") from None
+    return rows_
+
+
+def material_function(function: Any) -> Any:
+    """Of one kind, whatever is callable; `batched` says whether it is asked for many places at once."""
+    ask: Any
+    if getattr(function, "batched", False):
+        def ask(count: int, *columns: Array) -> Array:
+            return _samples(function(MaterialQueries(*columns)), count)
+        ask.batched = True
+    else:
+        def ask(query: Any) -> Any:
+            return function(query)
+        ask.batched = False
+    return ask
+
+
 def materials(values: Any) -> list[dict[str, Any]] | Any:
     """A function as it is; an (n, 3) array as base colours; dictionaries with their images brought into shape."""
     if values is None:
         return []
     if callable(values):
-        return lambda query: values(query)  # of one kind, whatever is callable
+        return material_function(values)
     if isinstance(values, np.ndarray):
         return [{"base_color": tuple(map(float, color))} for color in rows(values, 3, "materials")]
     if isinstance(values, dict):

@@ -100,7 +100,7 @@ farfield::BakeInput describe(const Polygons& twig) {
 /// Light that comes along one path from the camera.
 vec3 trace_path(RTCScene scene, const farfield::Runtime& runtime, vec3 origin, vec3 direction, float pixel_spread,
                 farfield::Rng& rng) {
-  vec3 throughput(1.0f);
+  vec3 radiance(0.0f), throughput(1.0f);
   farfield::RayContext context;
   context.path_seed = rng.next_uint();
   context.cone_spread = pixel_spread;
@@ -109,10 +109,11 @@ vec3 trace_path(RTCScene scene, const farfield::Runtime& runtime, vec3 origin, v
     context.ray_seed = rng.next_uint();
     rtcIntersect1(scene, &context.embree, &ray);
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
-      return throughput * glm::mix(vec3(0.9f), vec3(0.3f, 0.5f, 0.9f), std::max(direction.y, 0.0f));
+      return radiance + throughput * glm::mix(vec3(0.9f), vec3(0.3f, 0.5f, 0.9f), std::max(direction.y, 0.0f));
     }
     context.cone_width += context.cone_spread * ray.ray.tfar;
     const farfield::Interaction interaction = runtime.interaction(ray, context);
+    radiance += throughput * interaction.emission;
     const farfield::ScatterSample sample = interaction.sample(rng);
     throughput *= sample.weight;
     if (throughput == vec3(0.0f)) break;
@@ -121,7 +122,7 @@ vec3 trace_path(RTCScene scene, const farfield::Runtime& runtime, vec3 origin, v
     origin = interaction.ray_origin(sample.wi);
     direction = sample.wi;
   }
-  return vec3(0.0f);
+  return radiance;
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ vec3 sky(const vec3& direction) {
 /// Light that comes along one path from the camera.
 vec3 trace_path(RTCScene scene, const farfield::Runtime& runtime, vec3 origin, vec3 direction, float pixel_spread,
                 farfield::Rng& rng) {
-  vec3 throughput(1.0f);
+  vec3 radiance(0.0f), throughput(1.0f);
   farfield::RayContext context;  // (4) instead of an RTCIntersectContext
   context.path_seed = rng.next_uint();
   context.cone_spread = pixel_spread;
@@ -37,11 +37,12 @@ vec3 trace_path(RTCScene scene, const farfield::Runtime& runtime, vec3 origin, v
     RTCRayHit ray = host::make_ray(origin, direction);
     context.ray_seed = rng.next_uint();
     rtcIntersect1(scene, &context.embree, &ray);
-    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return throughput * sky(direction);
+    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return radiance + throughput * sky(direction);
 
     context.cone_width += context.cone_spread * ray.ray.tfar;
     if (ray.hit.geomID == runtime.geometry_id()) {  // (5) a hit on Farfield geometry
       const farfield::Interaction interaction = runtime.interaction(ray, context);
+      radiance += throughput * interaction.emission;
       const farfield::ScatterSample sample = interaction.sample(rng);
       throughput *= sample.weight;
       context.cone_spread = interaction.next_cone_spread(sample, context.cone_spread);
@@ -55,9 +56,9 @@ vec3 trace_path(RTCScene scene, const farfield::Runtime& runtime, vec3 origin, v
       origin = host::above_ground(ray);
       direction = host::cosine_direction_up(rng);
     }
-    if (throughput == vec3(0.0f)) return vec3(0.0f);
+    if (throughput == vec3(0.0f)) break;
   }
-  return vec3(0.0f);
+  return radiance;
 }
 
 }  // namespace

@@ -111,6 +111,7 @@ class PathTracer {
         const farfield::Interaction interaction = runtime_.interaction(ray, context);
         context.set_origin(context.hit);
         pixel.finest_level = std::min(pixel.finest_level, interaction.level);
+        pixel.radiance += throughput * interaction.emission;
         const vec3 sun = interaction.eval(kTowardsSun, rng);
         pixel.radiance += throughput * sun * sunlight(interaction.ray_origin(kTowardsSun), context, rng);
         const farfield::ScatterSample sample = interaction.sample(rng);

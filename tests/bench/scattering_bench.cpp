@@ -128,26 +128,22 @@ void add_surface(const std::string& name, const SurfaceParams& p) {
   const vec3 n = glm::normalize(vec3(1, 2, -0.5f));
   const auto over = [n](const vec3& w) { return glm::dot(n, w) < 0 ? -w : w; };
   add(name + "/set up", [=](const vec3& wo, const vec3&, Rng&) { return Bsdf(p, n, over(wo)); });
-  add(name + "/eval", [=](const vec3& wo, const vec3& wi, Rng& rng) { return Bsdf(p, n, over(wo)).eval(wi, rng); });
+  add(name + "/eval", [=](const vec3& wo, const vec3& wi, Rng&) { return Bsdf(p, n, over(wo)).eval(wi); });
   add(name + "/pdf", [=](const vec3& wo, const vec3& wi, Rng&) { return Bsdf(p, n, over(wo)).pdf(wi); });
   add(name + "/sample", [=](const vec3& wo, const vec3&, Rng& rng) { return Bsdf(p, n, over(wo)).sample(rng); });
 }
 
 void add_surfaces() {
-  const vec3 n = glm::normalize(vec3(1, 2, -0.5f));
   SurfaceParams p;
-  p.sggx = SymMat3::outer(n), p.diffuse = vec3(0.5f);
-  add_surface<SurfaceModel<kDiffuse>>("surface flat diffuse, trimmed", p);
-  add_surface<SurfaceBsdf>("surface flat diffuse, full model", p);
+  p.diffuse = vec3(0.5f);
+  add_surface<SurfaceModel<kDiffuse>>("surface diffuse, trimmed", p);
+  add_surface<SurfaceBsdf>("surface diffuse, full model", p);
   SurfaceParams plastic = p;
   plastic.specular = vec3(0.04f), plastic.roughness2 = 0.1f;
-  add_surface<SurfaceModel<kDiffuse | kSpecular>>("surface flat plastic, trimmed", plastic);
-  add_surface<SurfaceBsdf>("surface flat plastic, full model", plastic);
-  p.sggx = sggx({1, 0.2f, 0.1f});
-  add_surface<SurfaceModel<kDiffuse | kNormals>>("surface rough diffuse, trimmed", p);
-  add_surface<SurfaceBsdf>("surface rough diffuse, full model", p);
-  plastic.sggx = p.sggx, plastic.transmission = vec3(0.2f);
-  add_surface<SurfaceBsdf>("surface rough plastic leaf, full model", plastic);
+  add_surface<SurfaceModel<kDiffuse | kSpecular>>("surface plastic, trimmed", plastic);
+  add_surface<SurfaceBsdf>("surface plastic, full model", plastic);
+  plastic.transmission = vec3(0.2f);
+  add_surface<SurfaceBsdf>("surface plastic leaf, full model", plastic);
 }
 
 template <typename Phase>

@@ -110,28 +110,26 @@ void write_lobes(const std::string& folder) {
   write_map(folder + "/phase_glossy_leaf.csv", [&](const vec3& wi) { return average(glossy, wi); });
 }
 
-/// How the albedo of a white plastic (diffuse 1, F0 0.04) and of a white metal depends on angle, roughness and bumps.
+/// How the albedo of a white plastic (diffuse 1, F0 0.04) and of a white metal depends on angle and roughness.
 void write_furnace(const std::string& folder) {
   std::ofstream out(folder + "/furnace.csv");
-  out << "surface,roughness2,spread,cos,albedo\n";
+  out << "surface,roughness2,cos,albedo\n";
   const vec3 n(0, 0, 1);
   for (const char* surface : {"diffuse", "plastic", "metal"}) {
     for (const float roughness2 : {0.01f, 0.1f, 0.5f}) {
-      for (const float spread : {0.0f, 0.05f, 0.3f}) {
-        for (int i = 1; i <= 25; ++i) {
-          const float cos = float(i) / 25;
-          SurfaceParams p;
-          p.sggx = {spread, spread, 1, 0, 0, 0}, p.roughness2 = roughness2;
-          if (surface[0] != 'm') p.diffuse = vec3(1.0f);
-          if (surface[0] == 'p') p.specular = vec3(0.04f);
-          if (surface[0] == 'm') p.specular = vec3(1.0f);
-          const SurfaceBsdf bsdf(p, n, {std::sqrt(1 - cos * cos), 0, cos});
-          Rng rng(1);
-          double sum = 0;
-          constexpr int count = 20000;
-          for (int k = 0; k < count; ++k) sum += bsdf.sample(rng).weight.x;
-          out << surface << ',' << roughness2 << ',' << spread << ',' << cos << ',' << sum / count << '\n';
-        }
+      for (int i = 1; i <= 25; ++i) {
+        const float cos = float(i) / 25;
+        SurfaceParams p;
+        p.roughness2 = roughness2;
+        if (surface[0] != 'm') p.diffuse = vec3(1.0f);
+        if (surface[0] == 'p') p.specular = vec3(0.04f);
+        if (surface[0] == 'm') p.specular = vec3(1.0f);
+        const SurfaceBsdf bsdf(p, n, {std::sqrt(1 - cos * cos), 0, cos});
+        Rng rng(1);
+        double sum = 0;
+        constexpr int count = 20000;
+        for (int k = 0; k < count; ++k) sum += bsdf.sample(rng).weight.x;
+        out << surface << ',' << roughness2 << ',' << cos << ',' << sum / count << '\n';
       }
     }
   }

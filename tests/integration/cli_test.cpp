@@ -52,8 +52,19 @@ std::string contents(const fs::path& path) {
 
 void write(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
 
-/// Failed, with exactly one line on standard error that names the command and has `part`, and nothing else said.
-void expect_one_line_error(const ProcessOutput& output, const std::string& part) {
+/// What follows the warnings at the start.
+std::string without_warnings(std::string text) {
+  for (size_t end; (end = text.find('\n')) != std::string::npos;) {
+    if (text.substr(0, end).find(": warning: ") == std::string::npos) break;
+    text.erase(0, end + 1);
+  }
+  return text;
+}
+
+/// Failed, with exactly one line on standard error that names the command and has `part`, and nothing else said but
+/// warnings that came before.
+void expect_one_line_error(ProcessOutput output, const std::string& part) {
+  output.err = without_warnings(output.err);
   EXPECT_NE(output.exit_code, 0);
   EXPECT_LT(output.exit_code, 128) << "killed by a signal";
   EXPECT_EQ(output.out, "");
@@ -461,6 +472,8 @@ TEST_F(WholeRoad, RenderAndShotOfAScene) {
     for (const char* key : {"frame", "seconds", "load_seconds", "accounted_bytes", "bias"})
       EXPECT_TRUE(frame.contains(key)) << key;
   EXPECT_LE(report["peak_accounted_bytes"], report["budget_bytes"]);
+  const std::string fingerprint = report["fingerprint"];
+  EXPECT_EQ(fingerprint.rfind("farfield ", 0), 0u) << "does not say which program rendered: " << fingerprint;
 
   render.insert(render.end(), {"--full-detail"});
   expect_quiet_success(farfield(render));
@@ -499,6 +512,47 @@ TEST(Warnings, OfABrokenMeshNameItAndTheSceneIsRendered) {
   const Json report = Json::parse(contents(folder / "shot/shot.json"));
   ASSERT_EQ(report["warnings"].size(), 1u) << report["warnings"];
   EXPECT_NE(report["warnings"][0].get<std::string>().find("\"torn\""), std::string::npos);
+}
+
+/// Warnings first, one a line, then the error.
+void expect_warning_before_error(const ProcessOutput& output, const std::string& command, const std::string& warning,
+                                 const std::string& error) {
+  EXPECT_EQ(output.exit_code, 1);
+  const size_t warned = output.err.find("farfield " + command + ": warning: " + warning);
+  const size_t failed = output.err.find(error);
+  EXPECT_NE(warned, std::string::npos) << output.err << "lacks: " << warning;
+  EXPECT_NE(failed, std::string::npos) << output.err << "lacks: " << error;
+  EXPECT_LT(warned, failed) << output.err;
+}
+
+TEST_F(WholeRoad, WhatAFailedImportHadWarnedOfIsSaidWithTheError) {
+  const std::string flat = path("flat.obj");
+  write(flat, "mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+  const std::string warning = "material library gone.mtl cannot be read", error = "no face has any area";
+  expect_warning_before_error(farfield({"bake", flat, "-o", path("flat.farfield")}), "bake", warning, error);
+  expect_warning_before_error(farfield({"info", flat}), "info", warning, error);
+  expect_warning_before_error(farfield({"evaluate", asset, "--source", flat}), "evaluate", warning, error);
+}
+
+TEST(Warnings, OfAMeshThatCannotBeBakedAreSaidByRenderAndShot) {
+  const fs::path folder = fresh_folder("flat_mesh");
+  const std::string scene = (folder / "scene.glb").string();
+  const std::string json = R"({"asset":{"version":"2.0"},"extensionsUsed":["EXT_of_nobody"],"scene":0,
+    "scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+    "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[2,0,0]}],
+    "bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36}]})";
+  write(scene, test::glb(json, test::raw<float>({0, 0, 0, 1, 0, 0, 2, 0, 0})));
+  const std::string error = "no face has any area";
+  const std::vector<std::pair<std::string, std::vector<std::string>>> commands = {
+      {"render", {"-o", (folder / "frame.exr").string()}},
+      {"shot", {"-o", (folder / "shot").string(), "--frames", "0-1"}}};
+  for (const auto& [command, rest] : commands) {
+    std::vector<std::string> arguments = {command, scene, "--size", "8x8"};
+    arguments.insert(arguments.end(), rest.begin(), rest.end());
+    const ProcessOutput output = farfield(arguments);
+    expect_warning_before_error(output, "bake", "extension EXT_of_nobody is not read", error);
+    expect_warning_before_error(output, command, "extension EXT_of_nobody is not read", error);
+  }
 }
 
 TEST_F(WholeRoad, TheSkyIsAPictureThatLightsASceneAlike) {

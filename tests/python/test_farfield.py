@@ -125,6 +125,14 @@ class Bake(InAFolder):
         with self.assertRaises(farfield.Error) as caught:
             farfield.info(self.folder / "none.farfield")
         self.assertEqual(caught.exception.code, "not found")
+        self.assertEqual(caught.exception.warnings, [])
+
+    def test_errors_have_the_warnings_that_came_before(self):
+        source = self.folder / "flat.obj"
+        source.write_text("mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+        with self.assertRaisesRegex(farfield.Error, "no face has any area") as caught:
+            farfield.bake_file(source, self.out)
+        self.assertEqual(caught.exception.warnings[0], "material library gone.mtl cannot be read")
 
     def test_tells_progress_and_ends_when_that_raises(self):
         seen = []
@@ -218,6 +226,31 @@ class Materials(InAFolder):
         self.assertGreater(root, 0)
         described, asked = (self.front(asset, level=root) for asset in (self.out, other))
         np.testing.assert_allclose(asked.mean((0, 1)), described.mean((0, 1)), rtol=0.01)
+
+    def test_a_batched_function_bakes_what_it_bakes_one_by_one(self):
+        def stripe(query):
+            return {"diffuse": (0.5, 0.25, 0.125) if query.uv[0] < 0.3 else (0.25, 0.5, 1), "roughness": 0.5}
+
+        asked = []
+
+        @farfield.batched
+        def stripes(at):
+            asked.append(len(at))
+            return {"diffuse": np.where(at.uv[:, :1] < np.float32(0.3), (0.5, 0.25, 0.125), (0.25, 0.5, 1)), "roughness": 0.5}
+
+        other = self.folder / "other.farfield"
+        farfield.bake(self.square(), self.out, materials=stripe, **SMALL)
+        farfield.bake(self.square(), other, materials=stripes, **SMALL)
+        self.assertGreater(max(asked), 100)
+        for level in self.out.glob("*.ffl"):
+            self.assertEqual(level.read_bytes(), (other / level.name).read_bytes(), level.name)
+        one, many = (self.front(farfield.open(self.out, materials=look), samples=4) for look in (stripe, stripes))
+        np.testing.assert_array_equal(one, many)
+
+        for message, answer in (("a material sample has no 'color'", {"color": 1}), ("not None", None),
+                                ("'diffuse' of .* places cannot have the shape", {"diffuse": np.zeros((2, 5))})):
+            with self.assertRaisesRegex(ValueError, message):
+                farfield.bake(self.square(), self.out, materials=farfield.batched(lambda at: answer), **SMALL)
 
     def test_what_a_function_raises_comes_out(self):
         def broken(query):

@@ -7,7 +7,10 @@
 #include <filesystem>
 #include <map>
 
+#include "bake_api/gather_mesh.h"
+#include "bake_api/source_from_input.h"
 #include "farfield/bake.h"
+#include "prefilter/condition.h"
 #include "tests/support/files.h"
 #include "tests/support/png_files.h"
 
@@ -16,6 +19,12 @@ namespace {
 
 namespace fs = std::filesystem;
 using glm::vec2, glm::vec3, glm::vec4;
+
+template <typename T>
+ErrorCode code_of(const Result<T>& result) {
+  EXPECT_FALSE(result);
+  return result ? ErrorCode::InvalidArgument : result.error().code;
+}
 
 /// A sphere of quads under a cloud of leaf cards: surface that stays and surface that becomes volume.
 struct Tree {
@@ -214,6 +223,51 @@ TEST_F(BakeApi, StopsWhenTold) {
   ASSERT_FALSE(baked);
   EXPECT_EQ(baked.error().code, ErrorCode::Cancelled);
   EXPECT_FALSE(fs::exists(out()));
+}
+
+TEST_F(BakeApi, AFunctionThatTakesManyPlacesBakesTheSame) {
+  BakeInput input = tree_.input();
+  input.material_function = [](const MaterialQuery& query) {
+    MaterialSample sample;
+    sample.diffuse = {query.uv.x, 0.5f * query.uv.y, query.material == 1 ? 0.75f : 0.25f};
+    return sample;
+  };
+  ASSERT_TRUE(bake_meshes(input, out("one"), small_settings()));
+  std::atomic<size_t> most{0};
+  input.material_batch_function = [ask = input.material_function, &most](const MaterialQuery* queries,
+                                                                         MaterialSample* samples, size_t count) {
+    for (size_t i = 0; i < count; ++i) samples[i] = ask(queries[i]);
+    for (size_t seen = most; seen < count && !most.compare_exchange_weak(seen, count);) {
+    }
+  };
+  input.material_function = {};
+  ASSERT_TRUE(bake_meshes(input, out("many"), small_settings()));
+  EXPECT_GT(most, 1000u);
+  EXPECT_EQ(level_bytes(out("one")), level_bytes(out("many")));
+}
+
+TEST_F(BakeApi, HearsACancelBeforeItCopiesOrWelds) {
+  std::atomic<bool> cancel{true};
+  const Job job{{}, &cancel};
+  BakeInput input = tree_.input();
+  EXPECT_EQ(code_of(gather_mesh(input, job)), ErrorCode::Cancelled);
+  EXPECT_EQ(code_of(source_from_input(input, job)), ErrorCode::Cancelled);
+  EXPECT_EQ(code_of(condition(gather_mesh(input).value(), "tree", job)), ErrorCode::Cancelled);
+  input.meshes[0].corners = {};  // its counts are wrong now: a cancelled check does not blame the input
+  EXPECT_EQ(code_of(gather_mesh(input, job)), ErrorCode::Cancelled);
+}
+
+TEST_F(BakeApi, AnErrorHasTheWarningsThatCameBeforeIt) {
+  BakeInput input = tree_.input();
+  input.meshes.emplace_back().name = "nothing";
+  const std::vector<std::string> wanted = {"mesh 1 (nothing): has no faces"};
+  input.materials[0].roughness = 2;
+  EXPECT_EQ(bake_meshes(input, out(), small_settings()).error().warnings, wanted);
+  input = tree_.input();
+  input.meshes.emplace_back().name = "nothing";
+  input.instances = {{0, glm::dmat4x3(glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1), glm::dvec3(0))}};
+  input.instances[0].to_asset *= 1e12;  // too large to condition
+  EXPECT_EQ(bake_meshes(input, out(), small_settings()).error().warnings, wanted);
 }
 
 TEST_F(BakeApi, KeepsToTheMemoryThatItMayTake) {

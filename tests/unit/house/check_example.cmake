@@ -1,43 +1,56 @@
 # SPDX-License-Identifier: Apache-2.0
-# cmake -D from=FILE -D headers=DIRS -D compiler=CXX -D work=DIR -P check_example.cmake: compiles the C++ example in
-# FILE, a Markdown document (its ```cpp block) or a header (the indented lines of its first comment), as a host would.
+# cmake -D from=FILE -D headers=DIRS -D compiler=CXX -D work=DIR -P check_example.cmake: compiles the C++ examples in
+# FILE, a Markdown document (all its ```cpp blocks) or a header (the indented lines of its first comment), as a host
+# would: each as the body of a function, after example_setting.h.
 file(READ ${from} text)
+set(functions "")
+set(count 0)
+
+function(add_example code)
+  string(REGEX REPLACE "(^|\n)#include [^\n]*" "\n" code "${code}") # those are in the setting
+  math(EXPR number "${count} + 1")
+  set(count ${number} PARENT_SCOPE)
+  set(functions "${functions}void example_${number}() {\n${code}\n}\n\n" PARENT_SCOPE)
+endfunction()
+
 if(from MATCHES "\\.md$")
-  if(NOT text MATCHES "```cpp\n#include <farfield/runtime.h>\n([^`]+)```")
-    message(FATAL_ERROR "${from} has no ```cpp block that starts with #include <farfield/runtime.h>")
+  string(FIND "${text}" "```cpp\n" begin)
+  while(NOT begin EQUAL -1)
+    math(EXPR begin "${begin} + 7")
+    string(SUBSTRING "${text}" ${begin} -1 text)
+    string(FIND "${text}" "```" length)
+    string(SUBSTRING "${text}" 0 ${length} code)
+    add_example("${code}")
+    math(EXPR rest "${length} + 3")
+    string(SUBSTRING "${text}" ${rest} -1 text)
+    string(FIND "${text}" "```cpp\n" begin)
+  endwhile()
+  if(count EQUAL 0)
+    message(FATAL_ERROR "${from} has no ```cpp block")
   endif()
-  set(example "${CMAKE_MATCH_1}")
 else()
   string(FIND "${text}" "#pragma once" end)
-  string(SUBSTRING "${text}" 0 ${end} example)
-  if(NOT example MATCHES "\n//   [^\n]+;\n")
+  string(SUBSTRING "${text}" 0 ${end} code)
+  if(NOT code MATCHES "\n//   [^\n]+;\n")
     message(FATAL_ERROR "${from} has no example: no indented lines of code in the comment before #pragma once")
   endif()
-  string(REPLACE "\n//   " "\n" example "${example}") # its prose stays a comment
+  string(REPLACE "\n//   " "\n" code "${code}") # its prose stays a comment
+  add_example("${code}")
 endif()
 
-# What a host has before it meets Farfield.
 get_filename_component(name ${from} NAME_WE)
 set(source ${work}/${name}_example.cpp)
-file(WRITE ${source} "#include <farfield/runtime.h>
-void example(RTCDevice device, RTCScene scene, RTCRayHit ray_hit, const std::vector<glm::mat4x3>& places,
-             glm::mat4x3 local_to_world, glm::vec3 eye, float pixel_spread, uint32_t path, uint32_t ray,
-             farfield::Rng rng, glm::vec3 throughput);
-void example(RTCDevice device, RTCScene scene, RTCRayHit ray_hit,
-             [[maybe_unused]] const std::vector<glm::mat4x3>& places, [[maybe_unused]] glm::mat4x3 local_to_world,
-             glm::vec3 eye, float pixel_spread, [[maybe_unused]] uint32_t path, [[maybe_unused]] uint32_t ray,
-             farfield::Rng rng, glm::vec3 throughput) {
-${example}
-}
-")
+file(WRITE ${source} "#include \"${CMAKE_CURRENT_LIST_DIR}/example_setting.h\"\n\n${functions}")
 set(includes)
 foreach(folder IN LISTS headers)
   if(NOT folder STREQUAL "/usr/include") # the compiler looks there anyway, and in its own order
     list(APPEND includes -I${folder})
   endif()
 endforeach()
-execute_process(COMMAND ${compiler} -std=c++17 -Wpedantic -Wall -Wextra -Werror -fsyntax-only ${includes} ${source}
+# Examples name things that they do not go on to use.
+execute_process(COMMAND ${compiler} -std=c++17 -Wpedantic -Wall -Wextra -Werror
+                        -Wno-unused-variable -Wno-unused-but-set-variable -fsyntax-only ${includes} ${source}
                 RESULT_VARIABLE result ERROR_VARIABLE errors)
 if(NOT result EQUAL 0)
-  message(FATAL_ERROR "the example in ${from} does not compile (as ${source}):\n${errors}")
+  message(FATAL_ERROR "the examples in ${from} do not compile (as ${source}):\n${errors}")
 endif()

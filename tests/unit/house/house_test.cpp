@@ -136,6 +136,16 @@ TEST(House, EveryCitationIsInTheReferences) {
   EXPECT_EQ(list(problems), "") << "add them to docs/references.md";
 }
 
+TEST(House, SamplesThatFollowPathsAddWhatHitsEmit) {
+  size_t tracers = 0;
+  for (const SourceFile& sample : files_in("samples", {".cpp"})) {
+    if (sample.text.find("throughput *= ") == std::string::npos) continue;
+    ++tracers;
+    EXPECT_NE(sample.text.find("throughput * interaction.emission"), std::string::npos) << sample.name;
+  }
+  EXPECT_GT(tracers, 0u);
+}
+
 TEST(House, DocumentsNameFilesAndSectionsThatExist) {
   std::set<std::string> paths;
   for (const auto& [room, unused] : documented_arrows()) {

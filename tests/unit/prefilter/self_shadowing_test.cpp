@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "prefilter/voxelize.h"
+#include "prefilter/measure_volume.h"
 #include "tests/support/surfaces.h"
 
 namespace farfield {
@@ -12,37 +12,42 @@ namespace {
 using test::leaf_cloud;
 using test::LeafCloud;
 
-const SymMat3 kIsotropic = SymMat3::identity();
-
-TEST(EscapeSums, OfNoLightAskForNothing) {
-  EXPECT_EQ(EscapeSums().ratio(kIsotropic, 1, 1), 1);
-  EscapeSums black;
-  black.add({0, 0, 1}, 0, false);
-  EXPECT_EQ(black.ratio(kIsotropic, 1, 1), 1);
+Voxel grey() {
+  Voxel voxel;
+  voxel.density = 1;
+  voxel.diffuse = vec3(1.0f, 0.3f, 0.0f);
+  return voxel;
 }
 
-TEST(EscapeSums, CompareWithTheMediumInTheSameDirections) {
-  EscapeSums sums;
-  sums.add({0, 0, 1}, 3, true);
-  sums.add({1, 0, 0}, 1, false);
-  EXPECT_NEAR(sums.ratio(kIsotropic, 0, 1), 0.75, 1e-6);
-  const SymMat3 flat = SymMat3::outer({1, 0, 0});  // only the second light is attenuated
-  EXPECT_NEAR(sums.ratio(flat, 0.5, 2), 3 / (3 + std::exp(-1.0)), 1e-6);
+TEST(LetEscape, DoesNothingForARatioOfOne) {
+  Voxel voxel = grey();
+  let_escape(1, voxel);
+  EXPECT_EQ(voxel.self_shadowing, 1);
+  EXPECT_NEAR(voxel.diffuse.y, 0.3f, 1e-6f);
 }
 
-TEST(EscapeSums, StayWithinTheirBounds) {
-  EscapeSums none, all;
-  none.add({0, 0, 1}, 1, false);
-  all.add({0, 0, 1}, 1, true);
-  for (const double density : {0.0, 1.0, 1e3, 1e30}) {
-    EXPECT_EQ(none.ratio(kIsotropic, density, 1), kLeastEscape) << density;
-    EXPECT_GE(all.ratio(kIsotropic, density, 1), 1) << density;
-    EXPECT_LE(all.ratio(kIsotropic, density, 1), kMostEscape) << density;
-  }
+TEST(LetEscape, ShadowsBelowOneAndBrightensAbove) {
+  Voxel clumped = grey(), smooth = grey();
+  let_escape(0.4, clumped);
+  EXPECT_NEAR(clumped.self_shadowing, 0.4f, 1e-6f);
+  EXPECT_EQ(clumped.diffuse.y, 0.3f);
+  let_escape(1.5, smooth);
+  EXPECT_EQ(smooth.self_shadowing, 1);
+  EXPECT_NEAR(smooth.diffuse.x, 1, 1e-6f);
+  EXPECT_NEAR(smooth.diffuse.y, 1.5 * 0.3 / (0.7 + 1.5 * 0.3), 1e-6);
+  EXPECT_EQ(smooth.diffuse.z, 0);
+}
+
+TEST(LetEscape, StaysWithinItsBounds) {
+  Voxel none = grey(), all = grey();
+  let_escape(0, none);
+  EXPECT_NEAR(none.self_shadowing, kLeastEscape, 1e-6);
+  let_escape(1e30, all);
+  EXPECT_NEAR(all.diffuse.y, 2 * 0.3 / 1.3, 1e-6);
 }
 
 SparseVolume voxelized(const Surface& geometry, double voxel_size) {
-  return *voxelize(geometry, {dvec3(0), voxel_size}, {});
+  return *measure_volume(geometry, {}, {dvec3(0), voxel_size}, {.rays_per_voxel = 100});
 }
 
 struct Means {

@@ -14,6 +14,16 @@ namespace {
 
 using namespace test;
 
+/// Of surfaces, and of flakes by one random flake.
+template <typename Model>
+vec3 value_of(const Model& model, const vec3& wi, Rng& rng) {
+  if constexpr (requires { model.eval(wi); }) {
+    return model.eval(wi);
+  } else {
+    return model.eval(wi, rng);
+  }
+}
+
 /// Both models see the same random numbers, so that stochastic values agree too.
 template <typename Full, typename Trimmed>
 void expect_same(const Full& full, const Trimmed& trimmed, unsigned channels) {
@@ -21,7 +31,7 @@ void expect_same(const Full& full, const Trimmed& trimmed, unsigned channels) {
   for (int i = 0; i < 20; ++i) {
     const vec3 wi(random_direction(directions));
     Rng a(i), b(i);
-    const vec3 x = full.eval(wi, a), y = trimmed.eval(wi, b);
+    const vec3 x = value_of(full, wi, a), y = value_of(trimmed, wi, b);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(x[c], y[c], 1e-5f * (1 + std::abs(x[c]))) << channels;
     EXPECT_NEAR(full.pdf(wi), trimmed.pdf(wi), 1e-5f * (1 + full.pdf(wi))) << channels;
     const ScatterSample s = full.sample(a), t = trimmed.sample(b);
@@ -44,7 +54,6 @@ TEST(Channels, TrimmedSurfacesAgreeWithTheFullModel) {
   const vec3 wo = glm::normalize(n + vec3(0.3f, -0.4f, 0.2f));
   for (unsigned channels = 0; channels <= kSurfaceChannels; ++channels) {
     SurfaceParams p;
-    p.sggx = (channels & kNormals) != 0 ? sggx_from({1, 0.3, 0.2}, dvec3(n)) : SymMat3::outer(n);
     if ((channels & kDiffuse) != 0) p.diffuse = vec3(0.5f, 0.2f, 0.1f);
     if ((channels & kTransmission) != 0) p.transmission = vec3(0.4f, 0.3f, 0.1f);
     if ((channels & kSpecular) != 0) p.specular = vec3(0.04f, 0.3f, 0.9f), p.roughness2 = 0.2f;
@@ -56,7 +65,6 @@ TEST(Channels, TrimmedSurfacesAgreeWithTheFullModel) {
 TEST(Channels, TrimmedFlakesAgreeWithTheFullModel) {
   const vec3 wo = glm::normalize(vec3(0.3f, -0.4f, 0.2f));
   for (unsigned channels = 0; channels <= kFlakeChannels; ++channels) {
-    if ((channels & ~kFlakeChannels) != 0) continue;
     FlakeParams p;
     p.sggx = sggx_from({1, 0.3, 0.2}, {1, 2, 3});
     if ((channels & kDiffuse) != 0) p.diffuse = vec3(0.5f, 0.2f, 0.1f);

@@ -166,7 +166,7 @@ TEST(FlakePhase, FlakesScatterLikeTheFacesTheyStandFor) {
     const Mean faces = mean_of(200000, 17, [&](Rng& r) {
       vec3 n(random_direction(r));
       if (n.z < 0) n = -n;
-      const SurfaceParams face{SymMat3::outer(n), p.diffuse, p.specular, p.transmission, roughness2};
+      const SurfaceParams face{p.diffuse, p.specular, p.transmission, roughness2};
       return 2.0f * n.z * by_side(SurfaceBsdf(face, n, wo).sample(r));
     });
     for (int c = 0; c < 3; ++c) {

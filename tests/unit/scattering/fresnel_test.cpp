@@ -3,47 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "scattering/microfacet.h"
-
 namespace farfield {
 namespace {
-
-TEST(VisibleFresnel, IsTheMeanOverVisibleFacets) {
-  double low = 0, high = 0;
-  for (const float alpha : {0.01f, 0.1f, 0.33f, 0.8f, 1.0f}) {
-    const BasicMicrofacets<double> facets(SymMat3{alpha * alpha, alpha * alpha, 1, 0, 0, 0}, dvec3(0, 0, 1));
-    for (const double cos : {1.0, 0.8, 0.6, 0.42, 0.25, 0.11, 0.05, 0.01}) {
-      const dvec3 w(std::sqrt(1 - cos * cos), 0, cos);
-      double sum = 0;
-      const int n = 100;
-      for (int i = 0; i < n; ++i) {
-        for (int j = 0; j < n; ++j) {
-          const dvec3 m = facets.sample_visible(w, (i + 0.5) / n, (j + 0.5) / n);
-          sum += std::pow(1 - glm::dot(w, m), 5) / (n * n);
-        }
-      }
-      const double error = VisibleFresnel(alpha).grazing_share(float(cos)) - sum;
-      low = std::min(low, error), high = std::max(high, error);
-    }
-  }
-  EXPECT_GT(low, -0.02);
-  EXPECT_LT(high, 0.02);
-}
-
-TEST(VisibleFresnel, MeanIsTheMeanOfTheTable) {
-  for (const float alpha : {0.0f, 0.1f, 0.37f, 1.0f}) {
-    const VisibleFresnel fresnel(alpha);
-    double mean = 0;
-    const int count = 100000;
-    for (int i = 0; i < count; ++i) {
-      const double cos = (i + 0.5) / count;
-      mean += 2 * cos * fresnel.grazing_share(float(cos)) / count;
-    }
-    EXPECT_NEAR(fresnel.mean_grazing_share(), mean, 1e-6);
-  }
-  // Smooth facets: 1/21, up to what linear interpolation of 33 nodes adds.
-  EXPECT_NEAR(VisibleFresnel(0).mean_grazing_share(), 1.0 / 21, 5e-4);
-}
 
 TEST(Fresnel, DielectricMeetsItsClosedForms) {
   EXPECT_NEAR(fresnel_dielectric(1, 1.5f), 0.04, 1e-6);

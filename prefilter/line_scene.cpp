@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "prefilter/line_scene.h"
+
+#include <algorithm>
+#include <atomic>
+#include <thread>
+#include <utility>
+
+#include "base/hash.h"
+#include "base/parallel.h"
+#include "prefilter/isotropic_lines.h"
+
+namespace farfield {
+namespace {
+
+/// In voxels: a hit where no voxel is stored counts for a voxel this close on its line.
+constexpr double kNearby = 2;
+
+}  // namespace
+
+Result<LineScene> LineScene::build(const OpacityScene& geometry, const Surface& macrosurface,
+                                   const SparseVolume& volume) {
+  LineScene scene(geometry, volume);
+  if (macrosurface.triangles.empty()) return scene;
+  FARFIELD_TRY_LET(auto macrosurface_scene, OpacityScene::build(macrosurface));
+  scene.add_macrosurface(std::move(macrosurface_scene), macrosurface.bounds());
+  return scene;
+}
+
+LineScene::LineScene(const OpacityScene& geometry, const SparseVolume& volume)
+    : geometry_(&geometry), grid_(volume), lattice_(volume.lattice) {}
+
+void LineScene::add_macrosurface(OpacityScene scene, const Box3& bounds) {
+  macrosurface_scene_ = std::move(scene);
+  // It may reach further than the volume.
+  const dvec3 lower = glm::min(grid_.box().lower, (dvec3(bounds.lower) - lattice_.origin) / lattice_.voxel_size);
+  const dvec3 upper = glm::max(grid_.box().upper, (dvec3(bounds.upper) - lattice_.origin) / lattice_.voxel_size);
+  before_ += glm::length(upper - lower);
+}
+
+double LineScene::along_ray(const VoxelRay& ray, float distance) const {
+  return std::clamp(static_cast<double>(distance) / lattice_.voxel_size - before_, 0.0, ray.far);
+}
+
+SeenLine LineScene::cast(const VoxelRay& ray, SplitMix& random) const {
+  SeenLine line;
+  line.ray = ray;
+  line.origin = vec3(lattice_.origin + (ray.origin - before_ * ray.direction) * lattice_.voxel_size);
+  line.direction = glm::normalize(vec3(ray.direction));
+  auto far = static_cast<float>((before_ + ray.far) * lattice_.voxel_size);
+  if (macrosurface_scene_) {
+    if (const auto wall = macrosurface_scene_->first_stop(line.origin, line.direction, far, random)) {
+      far = wall->distance;
+      line.ray.far = along_ray(ray, far);
+    }
+  }
+  line.hit = geometry_->first_stop(line.origin, line.direction, far, random);
+  if (line.hit) line.hit_at = along_ray(line.ray, line.hit->distance);
+  return line;
+}
+
+std::optional<uint32_t> LineScene::voxel_of_hit(const SeenLine& line) const {
+  std::optional<uint32_t> found;
+  VoxelRay before = line.ray, behind = line.ray;
+  before.near = std::max(0.0, line.hit_at - kNearby), before.far = line.hit_at;
+  grid_.walk(before, [&](uint32_t voxel, double, double) { return found = voxel, true; });
+  if (found) return found;
+  behind.near = line.hit_at, behind.far = line.hit_at + kNearby;
+  grid_.walk(behind, [&](uint32_t voxel, double, double) { return found = voxel, false; });
+  return found;
+}
+
+Result<void> for_lines(const LineScene& scene, const LinePass& pass,
+                       const std::function<void(const SeenLine&, SplitMix&)>& body) {
+  constexpr size_t kGrain = 1024;
+  const auto count = static_cast<size_t>(std::ceil(pass.lines));
+  std::atomic<size_t> done{0};  // relaxed: only for the progress
+  const std::thread::id caller = std::this_thread::get_id();
+  parallel_for(count, kGrain, [&](size_t first, size_t last) {
+    if (pass.job.is_cancelled()) return;
+    for (size_t i = first; i < last; ++i) {
+      SplitMix random(mix64(pass.seed, i));
+      body(scene.cast(isotropic_line(scene.grid().box(), even_coordinates(i, pass.seed)), random), random);
+    }
+    const size_t done_now = done.fetch_add(last - first, std::memory_order_relaxed) + last - first;
+    if (std::this_thread::get_id() == caller) {
+      pass.job.report(static_cast<double>(done_now) / static_cast<double>(count), "see");
+    }
+  });
+  if (pass.job.is_cancelled()) return make_error(ErrorCode::Cancelled, "voxelize: cancelled");
+  return {};
+}
+
+}  // namespace farfield

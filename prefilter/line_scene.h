@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// The geometry of a level and its volume, as long lines through both see them.
+#pragma once
+
+#include <cmath>
+#include <functional>
+#include <optional>
+
+#include "base/job.h"
+#include "base/result.h"
+#include "base/split_mix.h"
+#include "prefilter/ray_scene.h"
+#include "prefilter/surface.h"
+#include "prefilter/voxel_walk.h"
+#include "prefilter/voxelize.h"
+
+namespace farfield {
+
+/// A line through the volume, up to where the macrosurface stops it, and what it sees of the geometry.
+struct SeenLine {
+  VoxelRay ray;
+  std::optional<RayHit> hit;  ///< on the geometry; the distance is from `origin`, in scene units
+  double hit_at = 0;          ///< along `ray`
+  vec3 origin{0.0f};          ///< where the line starts, outside everything, in the space of positions
+  vec3 direction{0.0f};       ///< unit
+
+  vec3 point() const { return origin + hit->distance * direction; }
+  /// How far it sees into the volume, along `ray`.
+  double seen_until() const { return hit ? hit_at : ray.far; }
+};
+
+/// Refers to the scene of the geometry. Immutable; any thread.
+class LineScene {
+ public:
+  /// `volume` is a voxelisation of `geometry`; only where its voxels are matters, and must stay. The macrosurface is
+  /// what the level shows as it is. Errors: those of RayScene::build().
+  static Result<LineScene> build(const OpacityScene& geometry, const Surface& macrosurface, const SparseVolume& volume);
+
+  const Surface& geometry() const { return geometry_->surface(); }
+  const VoxelGrid& grid() const { return grid_; }
+  const VoxelLattice& lattice() const { return lattice_; }
+
+  /// `ray` starts on the surface of grid().box(). `random` is used only where faces are not opaque.
+  SeenLine cast(const VoxelRay& ray, SplitMix& random) const;
+  /// The stored voxel that a hit belongs to: the one where it is or, if that is not stored, one close by on the line.
+  std::optional<uint32_t> voxel_of_hit(const SeenLine& line) const;
+
+  bool is_stopped_by_geometry(const vec3& origin, const vec3& direction, float near, float far,
+                              SplitMix& random) const {
+    return geometry_->is_stopped(origin, direction, near, far, random);
+  }
+  bool is_stopped_by_macrosurface(const vec3& origin, const vec3& direction, float near, float far,
+                                  SplitMix& random) const {
+    return macrosurface_scene_ && macrosurface_scene_->is_stopped(origin, direction, near, far, random);
+  }
+
+ private:
+  LineScene(const OpacityScene& geometry, const SparseVolume& volume);
+  void add_macrosurface(OpacityScene scene, const Box3& bounds);
+  double along_ray(const VoxelRay& ray, float distance) const;
+
+  const OpacityScene* geometry_;
+  std::optional<OpacityScene> macrosurface_scene_;
+  VoxelGrid grid_;
+  VoxelLattice lattice_;
+  double before_ = 1;  ///< in voxels: how far before the volume lines start
+};
+
+/// Lines of one purpose.
+struct LinePass {
+  double lines = 0;   ///< how many, rounded up
+  uint64_t seed = 0;  ///< equal seeds give equal lines
+  Job job{};          ///< reports from the calling thread alone
+};
+
+/// Casts isotropic lines and calls body(line, a random stream of its own) for each, from several threads. What body is
+/// called with does not depend on their number. Errors: Cancelled. The volume is not empty.
+Result<void> for_lines(const LineScene& scene, const LinePass& pass,
+                       const std::function<void(const SeenLine&, SplitMix&)>& body);
+
+/// Calls visit(number of the voxel, optical depth there) along a ray through a volume with this grid.
+template <typename Visit>
+void visit_depths(const SparseVolume& volume, const VoxelGrid& grid, const VoxelRay& ray, Visit&& visit) {
+  const vec3 direction(ray.direction);
+  const double size = volume.lattice.voxel_size;
+  grid.walk(ray, [&](uint32_t number, double enter, double leave) {
+    const Voxel& voxel = volume.voxels[number];
+    const double sigma = std::sqrt(std::max(0.0f, voxel.sggx.quadratic(direction)));
+    visit(number, (leave - enter) * size * static_cast<double>(voxel.density) * sigma);
+    return true;
+  });
+}
+
+inline double optical_depth(const SparseVolume& volume, const VoxelGrid& grid, const VoxelRay& ray) {
+  double depth = 0;
+  visit_depths(volume, grid, ray, [&](uint32_t, double of_voxel) { depth += of_voxel; });
+  return depth;
+}
+
+}  // namespace farfield

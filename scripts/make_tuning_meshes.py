@@ -1,0 +1,121 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Writes the meshes that densities were tuned on besides the public tree (docs/decisions/0012), as OBJ files:
+
+    scripts/make_tuning_meshes.py OUT_DIR
+
+rigging.obj  ropes of 6 sides between masts and yards, and ratlines: thin, long, aligned.
+planks.obj   three decks of 60 boards with gaps of a tenth of their width.
+conifer.obj  a tree of needles: clumps of clumps, no leaf as wide as a voxel.
+"""
+import math
+import random
+import sys
+from pathlib import Path
+
+
+class Mesh:
+    def __init__(self):
+        self.points, self.faces = [], []
+
+    def tube(self, a, b, radius, sides=6):
+        """A closed rod from a to b."""
+        axis = [q - p for p, q in zip(a, b)]
+        length = math.sqrt(sum(x * x for x in axis))
+        w = [x / length for x in axis]
+        u = cross(w, (1, 0, 0) if abs(w[0]) < 0.7 else (0, 1, 0))
+        u = scaled(u, 1 / math.sqrt(sum(x * x for x in u)))
+        v = cross(w, u)
+        first = len(self.points) + 1
+        for end in (a, b):
+            for i in range(sides):
+                c, s = radius * math.cos(2 * math.pi * i / sides), radius * math.sin(2 * math.pi * i / sides)
+                self.points.append([e + c * x + s * y for e, x, y in zip(end, u, v)])
+        for i in range(sides):
+            j = (i + 1) % sides
+            self.faces.append([first + i, first + j, first + sides + j, first + sides + i])
+        self.faces.append([first + i for i in reversed(range(sides))])
+        self.faces.append([first + sides + i for i in range(sides)])
+
+    def box(self, lower, upper):
+        first = len(self.points) + 1
+        for i in range(8):
+            self.points.append([(upper if i >> a & 1 else lower)[a] for a in range(3)])
+        for face in ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)):
+            self.faces.append([first + i for i in face])
+
+    def write(self, path):
+        with open(path, "w") as out:
+            out.writelines("v %.6g %.6g %.6g\n" % tuple(p) for p in self.points)
+            out.writelines("f " + " ".join(map(str, f)) + "\n" for f in self.faces)
+
+
+def cross(a, b):
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def scaled(a, f):
+    return [x * f for x in a]
+
+
+def rigging():
+    mesh = Mesh()
+    for mast in (-4.0, 0.0, 4.0):
+        mesh.tube((mast, 0, 0), (mast, 10, 0), 0.12, 8)
+        for height in (4.0, 6.5, 9.0):
+            mesh.tube((mast, height, -2.2), (mast, height, 2.2), 0.06)
+        for side in (-1, 1):
+            feet = [(mast + 0.25 * (i - 3), 0.0, side * 2.0) for i in range(7)]
+            for foot in feet:
+                mesh.tube(foot, (mast, 8.0, 0), 0.02)
+            for step in range(1, 24):  # ratlines
+                t = step / 26
+                ends = [[p + t * (q - p) for p, q in zip(foot, (mast, 8.0, 0))] for foot in (feet[0], feet[-1])]
+                mesh.tube(ends[0], ends[1], 0.01)
+        for height in (6.0, 8.0, 9.8):  # stays
+            mesh.tube((mast, height, 0), (mast + 3.6, 0.5, 0), 0.02)
+    return mesh
+
+
+def planks():
+    mesh = Mesh()
+    for deck in range(3):
+        for i in range(60):
+            mesh.box((-5, 1.5 * deck, -3 + 0.1 * i), (5, 1.5 * deck + 0.04, -3 + 0.1 * i + 0.09))
+    return mesh
+
+
+def conifer(seed=3):
+    mesh, rng = Mesh(), random.Random(seed)
+    mesh.tube((0, 0, 0), (0, 10, 0), 0.12, 8)
+    for whorl in range(28):
+        height = 1.0 + 8.8 * whorl / 28
+        reach = 3.0 * (1 - (height - 1) / 9.6)
+        for _ in range(6):
+            azimuth = rng.uniform(0, 2 * math.pi)
+            out = (math.cos(azimuth), -0.25 + rng.uniform(-0.1, 0.1), math.sin(azimuth))
+            length = reach * rng.uniform(0.7, 1.0)
+            tip = [length * x for x in out]
+            tip[1] += height
+            mesh.tube((0, height, 0), tip, 0.02, 4)
+            for _ in range(int(70 * length)):
+                t = rng.uniform(0.15, 1)
+                at = [t * length * x for x in out]
+                at[1] += height
+                way = [x + rng.uniform(-1.2, 1.2) for x in out]
+                norm = 0.16 / math.sqrt(sum(x * x for x in way))
+                mesh.tube(at, [p + norm * x for p, x in zip(at, way)], 0.006, 3)
+    return mesh
+
+
+def main():
+    out = Path(sys.argv[1])
+    out.mkdir(parents=True, exist_ok=True)
+    for make in (rigging, planks, conifer):
+        make().write(out / (make.__name__ + ".obj"))
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    main()
