@@ -256,8 +256,8 @@ Result<Evaluation> evaluate(const EvaluateOptions& options) {
   auto compared = compare(options, manifest, source_manifest, source_folder);
   FARFIELD_TRY_LET(auto evaluation, with_warnings(std::move(compared), source_manifest.warnings));
   evaluation.warnings = source_manifest.warnings;
-  const bool is_other = is_other_source(manifest, source_manifest);
-  if (const std::string reason = why_not_recorded(options, is_other); !reason.empty()) {
+  if (const std::string reason = why_not_recorded(options, is_other_source(manifest, source_manifest));
+      !reason.empty()) {
     evaluation.warnings.push_back(reason);
     return evaluation;
   }
