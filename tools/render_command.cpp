@@ -5,6 +5,7 @@
 #include "tools/commands.h"
 #include "tools/console.h"
 #include "tools/flags.h"
+#include "tools/memory_pools.h"
 #include "tools/render_flags.h"
 
 namespace farfield::tool {
@@ -15,6 +16,7 @@ struct FrameArguments : RenderArguments {
 };
 
 Result<void> run_render(FrameArguments& arguments) {
+  use_one_memory_pool();
   if (auto writable =
           check_can_write(arguments.output, Output::Exr, {arguments.scene, arguments.environment, arguments.assets});
       !writable)

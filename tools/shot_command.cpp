@@ -7,6 +7,7 @@
 #include "tools/commands.h"
 #include "tools/console.h"
 #include "tools/flags.h"
+#include "tools/memory_pools.h"
 #include "tools/render_flags.h"
 
 namespace farfield::tool {
@@ -17,6 +18,7 @@ struct ShotArguments : RenderArguments {
 };
 
 Result<void> run_shot(ShotArguments& arguments) {
+  use_one_memory_pool();
   const auto report = run_with_progress("shot", arguments, [&](const RenderOptions& options) {
     return render_shot(options, arguments.frames, arguments.output);
   });
