@@ -41,6 +41,9 @@ def bake(name, source, folder):
 
 def evaluate(name, source, folder, views):
     result = folder / (name + ".json")
+    levels = json.loads((folder / (name + ".farfield") / "manifest.json").read_text())["levels"]
+    if len(levels) == 1:  # no other would be smaller than the source
+        return {"levels": []}
     if not result.exists():
         run(FARFIELD, "evaluate", folder / (name + ".farfield"), "--source", source, "--views", views, "--json",
             result.with_suffix(".part"), "--sheet", folder / (name + ".png"))
@@ -61,7 +64,9 @@ def bias(values):
 def table(name, is_tuned, figures):
     lines = ["## %s%s" % (name, "" if is_tuned else " (untouched)"), "",
              "Bake: %.0f CPU seconds." % figures["bake_cpu_seconds"], ""]
-    lights = [light["light"] for light in figures["levels"][0]["lights"]] if figures["levels"] else []
+    if not figures["levels"]:
+        return lines + ["No level is smaller than the source, which is shown at every distance.", ""]
+    lights = [light["light"] for light in figures["levels"][0]["lights"]]
     head = ["grid", "on disk, KiB", "coverage", "rms", "rms, touched", *lights]
     lines += ["| %s |" % " | ".join(head), "|---" * len(head) + "|"]
     for level in figures["levels"]:
