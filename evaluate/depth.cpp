@@ -53,7 +53,7 @@ void add_set(const DepthPair& set, DepthSums& sums) {
     sums.raw += width * std::abs(all / kBatchCount);
     for (size_t batch = 0; batch < kDepthBatches; ++batch) {
       const double value = differences[batch][bin], others = all - value;
-      sums.low[batch] += width * (others > 0 ? value : (others < 0 ? -value : 0.0));
+      sums.low[batch] += width * with_sign_of_others(value, others);
       sums.high += width * std::abs(others) / (kBatchCount * (kBatchCount - 1.0));
     }
   }

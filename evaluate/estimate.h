@@ -27,6 +27,11 @@ struct Bounded {
   ErrorSize size() const { return value ? ErrorSize(*value) : ErrorSize::unknown(low, high); }
 };
 
+/// A share of |d| from independent parts of d: the value of one with the sign of the others, 0 where they have none.
+inline double with_sign_of_others(double value, double others) {
+  return others > 0 ? value : (others < 0 ? -value : 0.0);
+}
+
 /// A sum of what many pixels say, and whether that is more than noise.
 struct Evidence {
   Estimate estimate;

@@ -146,7 +146,7 @@ double add_sides(const PartValues& difference, AbsoluteSides& sides) {
   double low = 0, high = 0;
   for (const double value : difference) {
     const double others = sum - value;
-    low += others > 0 ? value : (others < 0 ? -value : 0.0);
+    low += with_sign_of_others(value, others);
     high += std::abs(others);
   }
   sides.raw += std::abs(sum / kPartCount);

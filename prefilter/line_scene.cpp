@@ -2,12 +2,10 @@
 #include "prefilter/line_scene.h"
 
 #include <algorithm>
-#include <atomic>
-#include <thread>
 #include <utility>
 
 #include "base/hash.h"
-#include "base/parallel.h"
+#include "base/parallel_job.h"
 #include "prefilter/isotropic_lines.h"
 
 namespace farfield {
@@ -74,20 +72,13 @@ Result<void> for_lines(const LineScene& scene, const LinePass& pass,
                        const std::function<void(const SeenLine&, SplitMix&)>& body) {
   constexpr size_t kGrain = 1024;
   const auto count = static_cast<size_t>(std::ceil(pass.lines));
-  std::atomic<size_t> done{0};  // relaxed: only for the progress
-  const std::thread::id caller = std::this_thread::get_id();
-  parallel_for(count, kGrain, [&](size_t first, size_t last) {
-    if (pass.job.is_cancelled()) return;
+  const bool is_done = parallel_for(pass.job, "see", count, kGrain, [&](size_t first, size_t last) {
     for (size_t i = first; i < last; ++i) {
       SplitMix random(mix64(pass.seed, i));
       body(scene.cast(isotropic_line(scene.grid().box(), even_coordinates(i, pass.seed)), random), random);
     }
-    const size_t done_now = done.fetch_add(last - first, std::memory_order_relaxed) + last - first;
-    if (std::this_thread::get_id() == caller) {
-      pass.job.report(static_cast<double>(done_now) / static_cast<double>(count), "see");
-    }
   });
-  if (pass.job.is_cancelled()) return make_error(ErrorCode::Cancelled, "voxelize: cancelled");
+  if (!is_done) return make_error(ErrorCode::Cancelled, "voxelize: cancelled");
   return {};
 }
 

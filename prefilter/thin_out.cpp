@@ -19,12 +19,6 @@ double mean_depth(const Voxel& voxel, double size) {
 /// a depth of 0.02 is nearly linear in it.
 bool is_surely_kept(const Voxel& voxel, double size) { return voxel.density * size > 2.5 * kFaintestDepth; }
 
-/// Random bits of a brick.
-uint64_t hash_of(const ivec3& coordinate, uint64_t seed) {
-  const auto bits = [](int v) { return static_cast<uint64_t>(static_cast<uint32_t>(v)); };
-  return mix64(mix64(seed, bits(coordinate.x) << 32 | bits(coordinate.y)), bits(coordinate.z));
-}
-
 float densest(const SparseVolume& volume, uint64_t first, const VoxelMask& mask) {
   float density = 0;
   for (const uint64_t word : mask) {
@@ -69,7 +63,7 @@ SparseVolume thin_out(const SparseVolume& volume, uint64_t seed) {
     uint64_t next = brick.first_voxel;
     brick.first_voxel = result.voxels.size();
     BrickThinner thinner(volume.lattice.voxel_size, densest(volume, next, brick.mask),
-                         to_unit_float(hash_of(brick.coordinate, seed)));
+                         to_unit_float(seed_of(brick.coordinate, seed)));
     for (int i = 0; i < kBrickVoxels; ++i) {
       uint64_t& word = brick.mask[static_cast<size_t>(i >> 6)];
       const uint64_t bit = uint64_t{1} << (i & 63);

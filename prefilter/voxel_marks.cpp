@@ -106,9 +106,7 @@ VoxelMask widen_brick(const std::array<const VoxelMask*, 27>& neighbours, double
 
 uint64_t VoxelSet::size() const {
   uint64_t count = 0;
-  for (const VoxelMask& mask : masks) {
-    for (const uint64_t word : mask) count += static_cast<uint64_t>(__builtin_popcountll(word));
-  }
+  for (const VoxelMask& mask : masks) count += voxel_count(mask);
   return count;
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/hash.h"
 #include "base/vec.h"
 #include "cache/level.h"
 #include "prefilter/surface.h"
@@ -24,6 +25,18 @@ inline constexpr int kVoxelLimit = 1 << 20;
 
 /// 8^3 voxels: bit x + 8 y of word z.
 using VoxelMask = std::array<uint64_t, 8>;
+
+inline size_t voxel_count(const VoxelMask& mask) {
+  size_t count = 0;
+  for (const uint64_t word : mask) count += static_cast<size_t>(__builtin_popcountll(word));
+  return count;
+}
+
+/// The seed of what is random about one voxel or brick.
+inline uint64_t seed_of(const ivec3& coordinate, uint64_t seed) {
+  const auto bits = [](int v) { return static_cast<uint64_t>(static_cast<uint32_t>(v)); };
+  return mix64(mix64(seed, bits(coordinate.x) << 32 | bits(coordinate.y)), bits(coordinate.z));
+}
 
 /// A set of voxels, by the bricks (from kBrickSide * coordinate upwards) that hold some.
 struct VoxelSet {

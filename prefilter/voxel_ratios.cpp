@@ -11,12 +11,6 @@ struct Ratio {
   double shrunk(double towards, double prior) const { return (source + prior * towards) / (medium + prior); }
 };
 
-size_t voxel_count(const VoxelMask& mask) {
-  size_t count = 0;
-  for (const uint64_t word : mask) count += static_cast<size_t>(__builtin_popcountll(word));
-  return count;
-}
-
 }  // namespace
 
 std::vector<double> shrunk_ratios(const SparseVolume& volume, const std::vector<SourceAndMedium>& sums, double prior) {

@@ -9,10 +9,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <thread>
 
 #include "base/hash.h"
-#include "base/parallel.h"
+#include "base/parallel_job.h"
 #include "base/result.h"
 #include "base/split_mix.h"
 #include "prefilter/density.h"
@@ -114,16 +113,11 @@ struct Measurement {
   uint64_t seed;
 };
 
-SplitMix random_of_voxel(const ivec3& coordinate, uint64_t seed) {
-  const auto bits = [](int v) { return static_cast<uint64_t>(static_cast<uint32_t>(v)); };
-  return SplitMix(mix64(mix64(seed, bits(coordinate.x) << 32 | bits(coordinate.y)), bits(coordinate.z)));
-}
-
 /// One voxel, or one with density 0 where no ray hits.
 Voxel measure_voxel(const Measurement& m, const ivec3& coordinate) {
   const double size = m.lattice.voxel_size;
   const vec3 center(m.lattice.origin + (dvec3(coordinate) + 0.5) * size);
-  SplitMix random = random_of_voxel(coordinate, m.seed);
+  SplitMix random(seed_of(coordinate, m.seed));
 
   VoxelRays voxel_rays{m.geometry, m.scene, center, static_cast<float>(size)};
   const HitSums& sums = voxel_rays.hits;
@@ -206,19 +200,12 @@ Result<std::vector<std::vector<Voxel>>> measure_bricks(const OpacityScene& geome
   const size_t first = std::min<uint64_t>(options.bricks.first, voxels.size());
   const size_t last = first + std::min<uint64_t>(options.bricks.count, voxels.size() - first);
   const size_t count = (last - first + stride - 1) / stride;
-  std::atomic<size_t> done{0};  // relaxed: only for the progress
-  const std::thread::id caller = std::this_thread::get_id();
-  parallel_for(count, 4, [&](size_t begin, size_t end) {
-    if (options.job.is_cancelled()) return;
+  const bool is_done = parallel_for(options.job, "voxelise", count, 4, [&](size_t begin, size_t end) {
     for (size_t i = first + begin * stride; i < std::min(first + end * stride, last); i += stride) {
       voxels[i] = measure_brick(measurement, candidates.coordinates[i], candidates.masks[i]);
     }
-    const size_t bricks_done = done.fetch_add(end - begin, std::memory_order_relaxed) + end - begin;
-    if (std::this_thread::get_id() == caller) {
-      options.job.report(static_cast<double>(bricks_done) / static_cast<double>(count), "voxelise");
-    }
   });
-  if (options.job.is_cancelled()) return make_error(ErrorCode::Cancelled, "voxelize: cancelled");
+  if (!is_done) return make_error(ErrorCode::Cancelled, "voxelize: cancelled");
   options.job.report(1, "voxelise");
   return voxels;
 }

@@ -63,7 +63,8 @@ struct CloseUp::Place {
   vec2 duv_dx{0.0f}, duv_dy{0.0f};  ///< the whole way across the footprint
   bool has_uv = false;              ///< usable ones
 
-  Place(const LevelView& level, const SurfacePoint& point) : at(source_point(level, point)) {
+  /// share: of the ray's width, over which maps are averaged.
+  Place(const LevelView& level, const SurfacePoint& point, float share) : at(source_point(level, point)) {
     if (level.corner_vertex.empty()) return;
     const uvec3& corners = level.corner_vertex[point.face];
     if (!level.shading_color.empty()) {
@@ -77,15 +78,15 @@ struct CloseUp::Place {
       uvs[k] = level.shading_uv[corners[static_cast<int>(k)]];
     }
     has_uv = std::ranges::all_of(uvs, is_usable_uv);
-    if (has_uv) set_footprint(point);
+    if (has_uv) set_footprint(point, point.width * share);
   }
 
   /// The ellipse in which a cone meets the triangle's plane, in texture coordinates.
-  void set_footprint(const SurfacePoint& point) {
+  void set_footprint(const SurfacePoint& point, float width) {
     const vec3 edge1 = positions[1] - positions[0], edge2 = positions[2] - positions[0];
     const vec3 normal = glm::cross(edge1, edge2);
     const float area2 = glm::dot(normal, normal), length = glm::length(point.direction);
-    if (!(area2 > 0) || !(length > 0) || !(point.width > 0)) return;
+    if (!(area2 > 0) || !(length > 0) || !(width > 0)) return;
     const vec3 unit_normal = normal / std::sqrt(area2), direction = point.direction / length;
     const float cosine = std::abs(glm::dot(unit_normal, direction));
     vec3 along = direction - unit_normal * glm::dot(unit_normal, direction);
@@ -98,8 +99,8 @@ struct CloseUp::Place {
       const float b2 = glm::dot(glm::cross(edge1, way), normal) / area2;
       return b1 * uv1 + b2 * uv2;
     };
-    duv_dx = in_uv(across * point.width);
-    duv_dy = in_uv(along * (point.width / std::max(cosine, 1 / kLongestStretch)));
+    duv_dx = in_uv(across * width);
+    duv_dy = in_uv(along * (width / std::max(cosine, 1 / kLongestStretch)));
     if (!std::isfinite(duv_dx.x + duv_dx.y + duv_dy.x + duv_dy.y)) duv_dx = duv_dy = vec2(0.0f);
   }
 
@@ -130,9 +131,7 @@ CloseUp::CloseUp(const std::filesystem::path& folder, const Manifest& manifest, 
 }
 
 float CloseUp::opacity(const LevelView& level, const SurfacePoint& point) const {
-  SurfacePoint narrow = point;
-  narrow.width *= kMaskShare;
-  const Place place(level, narrow);
+  const Place place(level, point, kMaskShare);
   std::optional<float> opacity;
   if (function_) {
     opacity = ask_host(place, true).opacity;
@@ -143,9 +142,7 @@ float CloseUp::opacity(const LevelView& level, const SurfacePoint& point) const 
 }
 
 CloseUpSample CloseUp::sample(const LevelView& level, const SurfacePoint& point) const {
-  SurfacePoint narrow = point;
-  narrow.width *= kMapShare;
-  const Place place(level, narrow);
+  const Place place(level, point, kMapShare);
   CloseUpSample out{place.at, {}};
   if (function_) {
     out.material = ask_host(place, false);

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
-#include <optional>
 #include <type_traits>
 
 #include "runtime/close_up.h"
@@ -245,8 +244,8 @@ ScatterSample Interaction::sample(Rng& rng) const {
     const float side = rng.next(), u1 = rng.next(), u2 = rng.next();
     sample.wi = horizon.sample(side, u1, u2);
   } else {
-    sample = model.surface.sample(rng);
-    if (!(sample.pdf > 0)) return {};
+    sample.wi = model.surface.sample_direction(rng);
+    if (sample.wi == vec3(0.0f)) return {};
   }
   sample.pdf = pdf(sample.wi);
   sample.weight = sample.pdf > 0 ? eval(sample.wi, rng) / sample.pdf : vec3(0.0f);

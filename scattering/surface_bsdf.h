@@ -40,6 +40,8 @@ class SurfaceModel {
   /// Exact density of sample(), per steradian.
   float pdf(const vec3& wi) const;
   ScatterSample sample(Rng& rng) const;
+  /// Its direction alone; 0 for a failed sample.
+  vec3 sample_direction(Rng& rng) const;
 
  private:
   static constexpr bool kHasDiffuse = (kChannels & kDiffuse) != 0;

@@ -82,18 +82,24 @@ float SurfaceModel<kChannels>::pdf(const vec3& wi) const {
 }
 
 template <unsigned kChannels>
-ScatterSample SurfaceModel<kChannels>::sample(Rng& rng) const {
-  if (!(specular_chance_ + diffuse_chance_ + transmission_chance_ > 0)) return {};
+vec3 SurfaceModel<kChannels>::sample_direction(Rng& rng) const {
+  if (!(specular_chance_ + diffuse_chance_ + transmission_chance_ > 0)) return vec3(0.0f);
   const float lobe = rng.next(), u1 = rng.next(), u2 = rng.next();
-  ScatterSample result;
-  const bool is_specular = kHasSpecular && lobe < specular_chance_;
-  if (is_specular) {
-    if constexpr (kHasSpecular) result.wi = reflect_about(wo_, specular_.facets.sample_visible(wo_, u1, u2));
-    if (!(glm::dot(n_, result.wi) > 0)) return {};
-  } else {
-    const bool through = kHasTransmission && transmission_chance_ > 0 && !(lobe < specular_chance_ + diffuse_chance_);
-    result.wi = cosine_lobe(through ? -n_ : n_, u1, u2);
+  if constexpr (kHasSpecular) {
+    if (lobe < specular_chance_) {
+      const vec3 wi = reflect_about(wo_, specular_.facets.sample_visible(wo_, u1, u2));
+      return glm::dot(n_, wi) > 0 ? wi : vec3(0.0f);
+    }
   }
+  const bool through = kHasTransmission && transmission_chance_ > 0 && !(lobe < specular_chance_ + diffuse_chance_);
+  return cosine_lobe(through ? -n_ : n_, u1, u2);
+}
+
+template <unsigned kChannels>
+ScatterSample SurfaceModel<kChannels>::sample(Rng& rng) const {
+  ScatterSample result;
+  result.wi = sample_direction(rng);
+  if (result.wi == vec3(0.0f)) return {};
   result.pdf = pdf(result.wi);
   if (result.pdf > 0) result.weight = eval(result.wi) / result.pdf;
   return result;

@@ -106,12 +106,17 @@ struct Total {
   double error() const { return source > 0 ? 100 * (static_cast<double>(level) / static_cast<double>(source) - 1) : 0; }
 };
 
+/// The same lines in every comparison.
+VoxelRay line_through(const Box3& bounds, size_t i) {
+  return isotropic_line({dvec3(bounds.lower), dvec3(bounds.upper)}, even_coordinates(i, 77));
+}
+
 void compare_lines(const Comparison& c, const Box3& bounds, size_t count) {
   Total total;
   parallel_for(count, 4096, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       SplitMix random(mix64(77, i));
-      const VoxelRay line = isotropic_line({dvec3(bounds.lower), dvec3(bounds.upper)}, even_coordinates(i, 77));
+      const VoxelRay line = line_through(bounds, i);
       const vec3 origin(line.origin), direction(line.direction);
       const auto far = static_cast<float>(line.far);
       total.add(c.source.first_stop(origin, direction, far, random) ? 1 : 0, c.opacity(origin, direction, far, random));
@@ -167,7 +172,7 @@ void compare_inside(const Comparison& c, const Box3& bounds, double resolution, 
   parallel_for(count, 4096, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
       SplitMix random(mix64(78, i));
-      const VoxelRay line = isotropic_line({dvec3(bounds.lower), dvec3(bounds.upper)}, even_coordinates(i, 77));
+      const VoxelRay line = line_through(bounds, i);
       const vec3 from(line.origin), along(line.direction);
       const auto hit = c.source.first_stop(from, along, static_cast<float>(line.far), random);
       if (!hit) continue;

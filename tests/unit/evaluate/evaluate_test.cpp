@@ -55,6 +55,16 @@ void bake_bush(const test::TemporaryFolder& folder) {
   ASSERT_TRUE(baked) << baked.error().message;
 }
 
+/// Its source, as level 0, against itself.
+EvaluateOptions against_itself(const test::TemporaryFolder& folder, int views, std::vector<Light> lights) {
+  EvaluateOptions options;
+  options.asset = folder.path() / "bush.farfield";
+  options.first_level = options.last_level = 0;
+  options.views = views;
+  options.lights = std::move(lights);
+  return options;
+}
+
 /// How many standard errors from 0.
 double deviation(const Estimate& estimate) { return std::abs(estimate.value) / estimate.standard_error; }
 
@@ -76,11 +86,7 @@ void expect_nothing_found(const ErrorMetrics& m, int samples) {
 TEST(Evaluate, ALevelAgainstItselfIsNotWrongAtAnyNumberOfSamples) {
   const test::TemporaryFolder folder;
   bake_bush(folder);
-  EvaluateOptions options;
-  options.asset = folder.path() / "bush.farfield";
-  options.first_level = options.last_level = 0;
-  options.views = 2;
-  options.lights = {Light::Daylight, Light::Front, Light::Sky};
+  EvaluateOptions options = against_itself(folder, 2, {Light::Daylight, Light::Front, Light::Sky});
   for (const int samples : {16, 64, 256, 1024}) {
     options.samples_per_pixel = samples;
     const auto evaluation = evaluate(options);
@@ -107,12 +113,8 @@ TEST(Evaluate, ALevelAgainstItselfIsNotWrongAtAnyNumberOfSamples) {
 TEST(Evaluate, KeepsNothingInTheAssetWithoutDaylight) {
   const test::TemporaryFolder folder;
   bake_bush(folder);
-  EvaluateOptions options;
-  options.asset = folder.path() / "bush.farfield";
-  options.first_level = options.last_level = 0;
-  options.views = 1;
+  EvaluateOptions options = against_itself(folder, 1, {Light::Behind});
   options.samples_per_pixel = 4;
-  options.lights = {Light::Behind};
   const auto evaluation = evaluate(options);
   ASSERT_TRUE(evaluation) << evaluation.error().message;
   ASSERT_FALSE(evaluation->warnings.empty());
