@@ -36,6 +36,13 @@ uint64_t hash_head(FileHeader header, Bytes table) {
 void copy_to(std::array<float, 3>& stored, const vec3& v) { stored = {v.x, v.y, v.z}; }
 vec3 to_vec3(const std::array<float, 3>& stored) { return {stored[0], stored[1], stored[2]}; }
 
+/// The first version that has what a level needs, so that older readers read what they can.
+uint32_t version_of(const LevelHeader& level, std::span<const SectionEntry> table) {
+  constexpr uint32_t kLastOfVersion1 = 18;
+  if (level.hot_spot != 0) return kLevelFileVersion;
+  return table.empty() || table.back().id <= kLastOfVersion1 ? 1 : 2;
+}
+
 LevelHeader to_level_header(const FileHeader& header) {
   LevelHeader level;
   level.level = header.level;
@@ -44,6 +51,7 @@ LevelHeader to_level_header(const FileHeader& header) {
   level.bounds.upper = to_vec3(header.bounds_upper);
   level.brick_dims = {header.brick_dims[0], header.brick_dims[1], header.brick_dims[2]};
   level.volume_origin = to_vec3(header.volume_origin);
+  level.hot_spot = header.hot_spot;
   return level;
 }
 
@@ -225,11 +233,9 @@ std::vector<std::byte> encode_head(const LevelView& level, const LevelLayout& la
     if (!array.empty()) table[next++].hash = hash_values(array);
   });
 
-  constexpr uint32_t kLastOfVersion1 = 18;
-  const bool is_of_version_1 = table.empty() || table.back().id <= kLastOfVersion1;
   FileHeader header{};
   header.magic = kLevelFileMagic;
-  header.version = is_of_version_1 ? 1 : kLevelFileVersion;  // so that older readers read what they can
+  header.version = version_of(level.header, table);
   header.section_count = static_cast<uint32_t>(table.size());
   header.file_bytes = layout.file_bytes;
   header.level = level.header.level;
@@ -238,6 +244,7 @@ std::vector<std::byte> encode_head(const LevelView& level, const LevelLayout& la
   copy_to(header.bounds_upper, level.header.bounds.upper);
   header.brick_dims = {level.header.brick_dims.x, level.header.brick_dims.y, level.header.brick_dims.z};
   copy_to(header.volume_origin, level.header.volume_origin);
+  header.hot_spot = level.header.hot_spot;
   header.head_hash = hash_head(header, std::as_bytes(std::span(table)));
 
   std::vector<std::byte> head(head_bytes(table.size()));

@@ -238,6 +238,12 @@ LevelData full_level_of_version_2() {
   return level;
 }
 
+LevelData full_level_of_version_3() {
+  LevelData level = full_level();
+  level.header.hot_spot = 0.15f;
+  return level;
+}
+
 LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks) {
   Rng rng(seed);
   LevelData level;
@@ -293,6 +299,7 @@ LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks) {
       level.morph_face.push_back(i % 5 == 0 ? kMorphCollapsed : rng.next_uint() % face);
     }
   }
+  if (bricks > 0 && has()) level.header.hot_spot = 0.5f * rng.next();
   return level;
 }
 

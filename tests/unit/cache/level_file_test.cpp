@@ -32,6 +32,7 @@ void expect_same(const LevelView& a, const LevelView& b) {
   EXPECT_EQ(a.header.bounds.upper, b.header.bounds.upper);
   EXPECT_EQ(a.header.brick_dims, b.header.brick_dims);
   EXPECT_EQ(a.header.volume_origin, b.header.volume_origin);
+  EXPECT_EQ(a.header.hot_spot, b.header.hot_spot);
   std::vector<std::span<const std::byte>> sections;
   for_each_section(a, [&](SectionId, const auto& array) { sections.push_back(std::as_bytes(array)); });
   size_t i = 0;
@@ -137,6 +138,10 @@ TEST(LevelFormat, GoldenBytesOfVersion1AreFrozen) { expect_frozen("/format_v1/le
 
 TEST(LevelFormat, GoldenBytesOfVersion2AreFrozen) {
   expect_frozen("/format_v2/level_3.ffl", 4160u, test::full_level_of_version_2());
+}
+
+TEST(LevelFormat, GoldenBytesOfVersion3AreFrozen) {
+  expect_frozen("/format_v3/level_3.ffl", 3264u, test::full_level_of_version_3());
 }
 
 TEST(LevelFile, CornersMustReferToShadingVertices) {
@@ -268,11 +273,14 @@ TEST(HostileLevelFile, HeaderAndTableFieldsAreChecked) {
   const std::vector<Case> cases = {
       {"does not start as a level file", [](auto& h, auto*) { h.magic[1] = 'X'; }},
       {"the format version is 0", [](auto& h, auto*) { h.version = 0; }},
-      {"level format 3, and this Farfield reads up to 2", [](auto& h, auto*) { h.version = 3; },
+      {"level format 4, and this Farfield reads up to 3", [](auto& h, auto*) { h.version = 4; },
        ErrorCode::Unsupported},
       {"the header says", [](auto& h, auto*) { h.file_bytes = kHuge; }},
       {"sections leaves the file", [](auto& h, auto*) { h.section_count = 0xffffffffu; }},
-      {"reserved bytes", [](auto& h, auto*) { h.reserved[39] = 1; }},
+      {"reserved bytes", [](auto& h, auto*) { h.reserved[35] = 1; }},
+      {"the hot spot's strength is -0.1", [](auto& h, auto*) { h.hot_spot = -0.1f; }},
+      {"the hot spot's strength is 0.71", [](auto& h, auto*) { h.hot_spot = 0.71f; }},
+      {"the hot spot's strength is nan", [](auto& h, auto*) { h.hot_spot = NAN; }},
       {"the resolution is 0", [](auto& h, auto*) { h.resolution = 0; }},
       {"the resolution is nan", [](auto& h, auto*) { h.resolution = NAN; }},
       {"the resolution is inf", [](auto& h, auto*) { h.resolution = INFINITY; }},
