@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How alike would levels look if they were meshes that meshoptimizer simplifies, in the same bytes?
 //
-//   build/release/bin/simplified_levels SOURCE ASSET.farfield simplify|sloppy OUT.farfield
+//   build/release/bin/simplified_levels SOURCE ASSET.farfield simplify|sloppy OUT.farfield [MESH]
 //   build/release/bin/farfield evaluate OUT.farfield --source SOURCE
 //
 // OUT is the asset with a mesh for each of its levels but the source: the source, resolved as the bake does it, that
@@ -134,9 +134,17 @@ Result<LevelEntry> replace(LevelEntry entry, const MeshLevel& mesh, const fs::pa
   return entry;
 }
 
-Result<void> run(const fs::path& source_file, const fs::path& asset, Simplifier simplifier, const fs::path& out) {
+struct Arguments {
+  fs::path source_file, asset;
+  Simplifier simplifier = Simplifier::Simplify;
+  fs::path out;
+  ImportOptions import;
+};
+
+Result<void> run(const Arguments& arguments) {
+  const auto& [source_file, asset, simplifier, out, import] = arguments;
   FARFIELD_TRY_LET(auto manifest, read_manifest(asset));
-  FARFIELD_TRY_LET(const auto source, import_asset(source_file));
+  FARFIELD_TRY_LET(const auto source, import_asset(source_file, import));
   if (source.source_hash != manifest.source_hash)
     return make_error(ErrorCode::InvalidArgument,
                       fmt::format("{}: was not baked from {}; bake it again", asset.string(), source_file.string()));
@@ -171,12 +179,14 @@ Result<void> run(const fs::path& source_file, const fs::path& asset, Simplifier 
 
 int main(int argc, char** argv) {
   using farfield::Simplifier;
-  if (argc != 5 || (std::strcmp(argv[3], "simplify") != 0 && std::strcmp(argv[3], "sloppy") != 0)) {
-    fmt::print("usage: simplified_levels SOURCE ASSET.farfield simplify|sloppy OUT.farfield\n");
+  if (argc < 5 || argc > 6 || (std::strcmp(argv[3], "simplify") != 0 && std::strcmp(argv[3], "sloppy") != 0)) {
+    fmt::print("usage: simplified_levels SOURCE ASSET.farfield simplify|sloppy OUT.farfield [MESH of a glTF]\n");
     return 2;
   }
-  const Simplifier simplifier = std::strcmp(argv[3], "sloppy") == 0 ? Simplifier::Sloppy : Simplifier::Simplify;
-  if (const auto done = farfield::run(argv[1], argv[2], simplifier, argv[4]); !done) {
+  farfield::Arguments arguments{argv[1], argv[2], Simplifier::Simplify, argv[4], {}};
+  if (std::strcmp(argv[3], "sloppy") == 0) arguments.simplifier = Simplifier::Sloppy;
+  if (argc == 6) arguments.import.mesh = std::atoi(argv[5]);
+  if (const auto done = farfield::run(arguments); !done) {
     fmt::print(stderr, "{}\n", done.error().message);
     return 1;
   }
