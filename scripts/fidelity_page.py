@@ -48,19 +48,23 @@ def level_table(levels):
          *(bias(light["color_bias"]) for light in level["lights"])] for level in levels))
 
 
+def simplified_row(method, ours, mesh, lights):
+    if mesh is None:
+        return ["%d" % ours["grid"], method, "nothing is left", *["-"] * (4 + len(lights))]
+    return ["%d" % ours["grid"], method, "%d" % mesh["triangles"], "%.0f" % (mesh["bytes_resident"] / 1024),
+            percent(mesh["occlusion_error"]), size(mesh["occlusion_rms_touched"]), size(ours["occlusion_rms_touched"]),
+            *(bias(light["color_bias"]) for light in mesh["lights"])]
+
+
 def simplified_table(levels, simplified):
-    lights = [light["light"] for levels in simplified.values() for level in levels[:1] for light in level["lights"]]
-    head = ["grid", "mesh", "triangles", "resident, KiB", "coverage", "rms, touched", "ours", *dict.fromkeys(lights)]
+    lights = list(dict.fromkeys(light["light"] for meshes in simplified.values() for mesh in meshes for light in mesh["lights"]))
+    head = ["grid", "mesh", "triangles", "resident, KiB", "coverage", "rms, touched", "ours", *lights]
     body = []
     for ours in levels:
         for method, meshes in simplified.items():
-            for mesh in meshes:
-                if mesh["grid"] != ours["grid"]:
-                    continue
-                body.append(["%d" % mesh["grid"], method, "%d" % mesh["triangles"], "%.0f" % (mesh["bytes_resident"] / 1024),
-                             percent(mesh["occlusion_error"]), size(mesh["occlusion_rms_touched"]),
-                             size(ours["occlusion_rms_touched"]), *(bias(light["color_bias"]) for light in mesh["lights"])])
-    return rows(head, body) if body else []
+            of_grid = [mesh for mesh in meshes if mesh["grid"] == ours["grid"]]
+            body.append(simplified_row(method, ours, of_grid[0] if of_grid else None, lights))
+    return rows(head, body)
 
 
 def section(figures):
@@ -83,7 +87,7 @@ def closer_text(method, all_figures):
     pairs = [(ours["occlusion_rms_touched"], mesh["occlusion_rms_touched"]) for figures in all_figures
              for ours in figures.levels for mesh in figures.simplified.get(method, []) if mesh["grid"] == ours["grid"]]
     known = [(ours or 0, mesh or 0) for ours, mesh in pairs]  # lost in noise: next to nothing
-    return "closer to the source than our level in %d of %d" % (sum(mesh < ours for ours, mesh in known), len(known))
+    return "%d closer to the source than our level" % sum(mesh < ours for ours, mesh in known)
 
 
 def summary(all_figures):

@@ -6,9 +6,9 @@ and writes docs/results/fidelity.md.
 Usage: nice nohup scripts/measure_fidelity.py FOLDER ['FILE*'...] [--only NAME...] [--list] [--views N] [--page FILE]
 
 The assets: every mesh of ../shared/assets, those of scripts/make_fidelity_assets.py, and FILEs beside them; with * behind it
-(quoted, for the shell), one that was looked at while tuning. --only: those of these names (--list shows them). Parts that FOLDER has of this very
-program are not measured again, so that an interrupted run goes on where it stopped. Needs the release build; meshes need
-libmeshoptimizer-dev.
+(quoted, for the shell), one that was looked at while tuning. --only: those of these names (--list shows them). Parts that
+FOLDER has of this very program are not measured again, so that an interrupted run goes on where it stopped. Needs the release
+build; meshes need libmeshoptimizer-dev and the target simplified_levels.
 """
 import argparse
 import hashlib
@@ -106,7 +106,7 @@ def evaluate(asset, baked, views, *options):
 
 
 def simplify(asset, baked, method, folder):
-    """The asset with meshes for levels. Whole when its manifest is there, which is written last."""
+    """The asset with meshes for levels."""
     meshes = folder / ("%s.%s" % (asset.name, method)) / "meshes.farfield"
     if not (meshes.parent / "done").exists():
         shutil.rmtree(meshes.parent, ignore_errors=True)
