@@ -33,6 +33,8 @@
 #include "prefilter/resolve.h"
 #include "prefilter/simplify.h"
 #include "prefilter/voxelize.h"
+#include "prefilter/wall_shell.h"
+#include "prefilter/walls.h"
 
 namespace farfield {
 namespace {
@@ -155,6 +157,14 @@ SplitSurface split(const Surface& surface, const std::vector<uint8_t>& is_macros
   return result;
 }
 
+/// Adds a surface of the same origin that shares no vertex.
+void append(const Surface& added, Surface& surface) {
+  const auto first = static_cast<uint32_t>(surface.positions.size());
+  surface.positions.insert(surface.positions.end(), added.positions.begin(), added.positions.end());
+  for (const uvec3& t : added.triangles) surface.triangles.push_back(t + first);
+  surface.materials.insert(surface.materials.end(), added.materials.begin(), added.materials.end());
+}
+
 /// Less than what a level with such a volume and surface has resident.
 uint64_t least_bytes(const VolumeSize& volume, const Surface& voxelized, const Surface& surface) {
   constexpr uint64_t kTriangle = 20;  // a BVH of quads takes more, without any array of ours
@@ -260,7 +270,7 @@ class Baker {
       FARFIELD_TRY(resolve_source(level, resolution));
     }
 
-    const SurfaceOrder order = simplify_surface(level, resolution, level_report);
+    FARFIELD_TRY_LET(const SurfaceOrder order, simplify_surface(level, resolution, level_report));
     if (options_.job.is_cancelled()) return cancelled();
 
     FARFIELD_TRY_LET(auto volume, voxelize_rest(level, resolution, level_report));
@@ -308,15 +318,16 @@ class Baker {
   }
 
   /// Steps A and S: what is no longer surface at this resolution leaves surface_, the rest is simplified.
-  SurfaceOrder simplify_surface(uint32_t level, double resolution, LevelReport& level_report) {
+  Result<SurfaceOrder> simplify_surface(uint32_t level, double resolution, LevelReport& level_report) {
     options_.job.report(share_done(level, 0), fmt::format("level {}: analyse", level));
     const Stopwatch analysis;
     const auto is_macrosurface = classify_macrosurface(surface_, static_cast<float>(resolution));
-    const SplitSurface parts = split(surface_, is_macrosurface, sub_resolution_);
+    SplitSurface parts = split(surface_, is_macrosurface, sub_resolution_);
+    FARFIELD_TRY(raise_walls(resolution, parts.macrosurface));
     level_report.macrosurface_triangles = parts.macrosurface.triangles.size();
     level_report.voxelized_triangles = sub_resolution_.triangles.size();
     level_report.analysis_seconds = analysis.seconds();
-    if (options_.job.is_cancelled()) return {};
+    if (options_.job.is_cancelled()) return cancelled();
 
     options_.job.report(share_done(level, 0.03), fmt::format("level {}: simplify", level));
     const Stopwatch simplification;
@@ -330,6 +341,22 @@ class Baker {
     compose(from_stored_.face, order.face_number);
     level_report.simplify_seconds = simplification.seconds();
     return order;
+  }
+
+  /// Sub-resolution geometry that looks like a wall at this resolution becomes surface.
+  Result<void> raise_walls(double resolution, Surface& macrosurface) {
+    FARFIELD_TRY_LET(auto is_wall, find_walls(sub_resolution_, resolution));
+    if (std::ranges::find(is_wall, 1) == is_wall.end()) return {};
+    Surface wall, rest;
+    wall.origin = rest.origin = sub_resolution_.origin;
+    split(sub_resolution_, is_wall, rest);
+    for (uint8_t& is : is_wall) is = !is;
+    split(sub_resolution_, is_wall, wall);
+    FARFIELD_TRY_LET(const Surface shell, wrap_wall(wall, resolution));
+    if (shell.triangles.empty()) return {};
+    sub_resolution_ = std::move(rest);
+    append(shell, macrosurface);
+    return {};
   }
 
   /// Step V, or its result from an interrupted bake.
