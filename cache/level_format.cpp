@@ -218,6 +218,17 @@ LevelLayout layout_of(const LevelView& level) {
   return layout;
 }
 
+namespace {
+
+/// The first version that had this section: so that older readers read what they can.
+uint32_t version_with(uint32_t last_section) {
+  constexpr uint32_t kLastOfVersion1 = 18, kLastOfVersion2 = 27;
+  if (last_section <= kLastOfVersion1) return 1;
+  return last_section <= kLastOfVersion2 ? 2 : kLevelFileVersion;
+}
+
+}  // namespace
+
 std::vector<std::byte> encode_head(const LevelView& level, const LevelLayout& layout) {
   std::vector<SectionEntry> table = layout.sections;
   size_t next = 0;
@@ -225,11 +236,9 @@ std::vector<std::byte> encode_head(const LevelView& level, const LevelLayout& la
     if (!array.empty()) table[next++].hash = hash_values(array);
   });
 
-  constexpr uint32_t kLastOfVersion1 = 18;
-  const bool is_of_version_1 = table.empty() || table.back().id <= kLastOfVersion1;
   FileHeader header{};
   header.magic = kLevelFileMagic;
-  header.version = is_of_version_1 ? 1 : kLevelFileVersion;  // so that older readers read what they can
+  header.version = version_with(table.empty() ? 0 : table.back().id);
   header.section_count = static_cast<uint32_t>(table.size());
   header.file_bytes = layout.file_bytes;
   header.level = level.header.level;

@@ -26,6 +26,7 @@ namespace {
 constexpr double kCell = 0.25;  ///< of the resolution: voxels, and the widest gap that is closed for sure
 constexpr uint32_t kRaysPerFace = 4;
 constexpr float kLeastCosine = 0.15f;  ///< rays that are flatter are cast at this angle
+constexpr float kLeastGap = 0.015f;    ///< share of rays through the wall below which it counts as tight
 constexpr float kEscapeLength = 1;     ///< in resolutions: how far light must get away
 
 /// Which voxels a set holds.
@@ -304,11 +305,18 @@ Result<Surface> wrap_wall(const Surface& wall, double resolution) {
 
   Seen all;
   all.sum = no_material();
-  for (const Seen& s : seen) all.sum = mix(all.sum, 1, s.sum, 1), all.hits += s.hits, all.escaped += s.escaped;
+  for (const Seen& s : seen) {
+    all.sum = mix(all.sum, 1, s.sum, 1);
+    all.rays += s.rays, all.hits += s.hits, all.escaped += s.escaped;
+  }
   if (!(all.hits > 0)) return Surface{};
+  const bool is_tight = all.hits > (1 - kLeastGap) * all.rays;
   Surface result = shell.surface;
   for (size_t f = 0; f < seen.size(); ++f) {
-    result.materials.push_back(mean_of(seen[f].hits > 0 ? seen[f] : all, all.escaped / all.hits, shell.outwards[f]));
+    const Seen& own = seen[f].hits > 0 ? seen[f] : all;
+    FaceMaterial m = mean_of(own, all.escaped / all.hits, shell.outwards[f]);
+    if (!is_tight) m.gap = 1 - seen[f].hits / seen[f].rays;
+    result.materials.push_back(m);
   }
   return result;
 }

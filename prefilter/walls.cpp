@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "base/hash.h"
 #include "base/parallel.h"
@@ -86,6 +87,8 @@ std::optional<Layer> thin_layer(const Moments& moments) {
   return Layer{moments.middle(), *normal};
 }
 
+TrianglePiece scaled(const TrianglePiece& t, double unit) { return {t[0] / unit, t[1] / unit, t[2] / unit}; }
+
 /// Moments of the geometry per cell.
 class MomentGrid {
  public:
@@ -98,10 +101,6 @@ class MomentGrid {
         cells_[place->second].moments.add(piece);
       });
     }
-  }
-
-  static TrianglePiece scaled(const TrianglePiece& t, double resolution) {
-    return {t[0] / resolution, t[1] / resolution, t[2] / resolution};
   }
 
   /// Cells in order of first use that lie in thin layers: these layers, and for the others nothing.
@@ -178,15 +177,22 @@ class LayerGrid {
   std::unordered_map<uint64_t, std::vector<uint32_t>> near_;
 };
 
-/// Whether most of a triangle's area is owned.
-bool is_mostly_owned(const LayerGrid& layers, const TrianglePiece& triangle) {
-  double all = 0, owned = 0;
-  for_each_piece(triangle, 1, [&](const TrianglePiece& piece) {
-    const double area = glm::length(area_vector_of(piece));
-    all += area;
-    if (layers.owns(middle_of(piece))) owned += area;
+/// Per face: 1 where is_in(point, in units of `unit`) says yes for most of its area.
+template <typename IsIn>
+std::vector<uint8_t> faces_mostly_in(const Surface& geometry, double unit, const IsIn& is_in) {
+  std::vector<uint8_t> result(geometry.triangles.size(), 0);
+  parallel_for(result.size(), 1024, [&](size_t begin, size_t end) {
+    for (size_t f = begin; f < end; ++f) {
+      double all = 0, inside = 0;
+      for_each_piece(scaled(corners_of(geometry, f), unit), 1, [&](const TrianglePiece& piece) {
+        const double area = glm::length(area_vector_of(piece));
+        all += area;
+        if (is_in(middle_of(piece))) inside += area;
+      });
+      result[f] = inside > 0.5 * all;
+    }
   });
-  return owned > 0.5 * all;
+  return result;
 }
 
 }  // namespace
@@ -212,12 +218,21 @@ Result<std::vector<uint8_t>> find_walls(const Surface& geometry, double resoluti
   if (walls.empty()) return is_wall;
 
   const LayerGrid grid(std::move(walls));
-  parallel_for(is_wall.size(), 1024, [&](size_t begin, size_t end) {
-    for (size_t f = begin; f < end; ++f) {
-      is_wall[f] = is_mostly_owned(grid, MomentGrid::scaled(corners_of(geometry, f), resolution));
-    }
-  });
-  return is_wall;
+  return faces_mostly_in(geometry, resolution, [&](const dvec3& point) { return grid.owns(point); });
+}
+
+std::vector<uint8_t> find_near(const Surface& geometry, const Surface& surface, const std::vector<uint8_t>& is_marked,
+                               double distance) {
+  std::unordered_set<uint64_t> near;
+  for (size_t f = 0; f < surface.triangles.size(); ++f) {
+    if (!is_marked[f]) continue;
+    for_each_piece(scaled(corners_of(surface, f), distance), 1, [&](const TrianglePiece& piece) {
+      for_each_cell_around(ivec3(glm::floor(middle_of(piece))), 1,
+                           [&](const ivec3& cell) { near.insert(cell_key(cell)); });
+    });
+  }
+  return faces_mostly_in(geometry, distance,
+                         [&](const dvec3& point) { return near.contains(cell_key(ivec3(glm::floor(point)))); });
 }
 
 }  // namespace farfield

@@ -20,4 +20,9 @@ namespace farfield {
 /// Deterministic for any thread count. Errors: those of OpacityScene::build().
 Result<std::vector<uint8_t>> find_walls(const Surface& geometry, double resolution);
 
+/// Per face of `geometry`: 1 where most of its area is within about `distance` (> 0) of faces of `surface` that are
+/// marked in `is_marked`. Deterministic for any thread count.
+std::vector<uint8_t> find_near(const Surface& geometry, const Surface& surface, const std::vector<uint8_t>& is_marked,
+                               double distance);
+
 }  // namespace farfield

@@ -238,6 +238,12 @@ LevelData full_level_of_version_2() {
   return level;
 }
 
+LevelData full_level_of_version_3() {
+  LevelData level = full_level_of_version_2();
+  level.face_gap = counted<uint8_t>(3, 17);
+  return level;
+}
+
 LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks) {
   Rng rng(seed);
   LevelData level;

@@ -139,6 +139,16 @@ TEST(LevelFormat, GoldenBytesOfVersion2AreFrozen) {
   expect_frozen("/format_v2/level_3.ffl", 4160u, test::full_level_of_version_2());
 }
 
+TEST(LevelFormat, GoldenBytesOfVersion3AreFrozen) {
+  expect_frozen("/format_v3/level_3.ffl", 4288u, test::full_level_of_version_3());
+}
+
+TEST(LevelFormat, GapsMustBelongToFaces) {
+  LevelData level = test::full_level_of_version_3();
+  level.face_gap.pop_back();
+  EXPECT_EQ(find_structure_problem(view_of(level)).value_or(""), "face_gap has 2 elements for 3 faces");
+}
+
 TEST(LevelFile, CornersMustReferToShadingVertices) {
   const auto problem = [](const std::function<void(LevelData&)>& spoil) {
     LevelData level = test::full_level_of_version_2();
@@ -268,7 +278,7 @@ TEST(HostileLevelFile, HeaderAndTableFieldsAreChecked) {
   const std::vector<Case> cases = {
       {"does not start as a level file", [](auto& h, auto*) { h.magic[1] = 'X'; }},
       {"the format version is 0", [](auto& h, auto*) { h.version = 0; }},
-      {"level format 3, and this Farfield reads up to 2", [](auto& h, auto*) { h.version = 3; },
+      {"level format 4, and this Farfield reads up to 3", [](auto& h, auto*) { h.version = 4; },
        ErrorCode::Unsupported},
       {"the header says", [](auto& h, auto*) { h.file_bytes = kHuge; }},
       {"sections leaves the file", [](auto& h, auto*) { h.section_count = 0xffffffffu; }},

@@ -169,6 +169,47 @@ TEST(WallShell, HasTheMaterialsOfItsTwoSides) {
   EXPECT_NEAR(blue / back, 0.395, 0.01);
 }
 
+/// Sheets without thickness let the same share through in all directions.
+TEST(WallShell, OfSheetsHasTheShareOfTheirGaps) {
+  for (const float gap : {0.04f, 0.12f}) {
+    Surface sheets;
+    for (int i = 0; i < 20; ++i) {
+      const auto x = static_cast<float>(i);
+      add_quad(sheets, {x, 0, 0}, {x + 1 - gap, 0, 0}, {x + 1 - gap, 20, 0}, {x, 20, 0});
+    }
+    add_materials(sheets);
+    const auto shell = wrap_wall(sheets, 2);
+    ASSERT_TRUE(shell);
+    double area = 0, open = 0;
+    for (size_t f = 0; f < shell->triangles.size(); ++f) {
+      const double of_face = glm::length(area_vector_of(corners_of(*shell, f)));
+      area += of_face, open += of_face * shell->materials[f].gap;
+    }
+    EXPECT_NEAR(open / area, gap, 0.15 * gap + 0.003);
+  }
+}
+
+TEST(WallShell, OfDeepNarrowGapsHasNone) {
+  const auto shell = wrap_wall(make_boards(0.02f), 2);
+  ASSERT_TRUE(shell);
+  for (const FaceMaterial& m : shell->materials) EXPECT_EQ(m.gap, 0);
+}
+
+TEST(Walls, AreFoundAgainWhereTheirSurfaceWas) {
+  const Surface boards = make_boards(0.05f);
+  const auto shell = wrap_wall(boards, 2);
+  ASSERT_TRUE(shell);
+  std::vector<uint8_t> is_left(shell->triangles.size());
+  for (size_t f = 0; f < is_left.size(); ++f) is_left[f] = shell->positions[shell->triangles[f].x].x < 8;
+  const auto is_near = find_near(boards, *shell, is_left, 1);
+  for (size_t f = 0; f < is_near.size(); ++f) {
+    const float x = boards.positions[boards.triangles[f].x].x;
+    if (x < 7 || x > 12) {
+      EXPECT_EQ(is_near[f], x < 7) << x;
+    }
+  }
+}
+
 /// Closed boards without gaps: nothing is lost between them.
 TEST(WallShell, TouchingBoardsKeepTheirColour) {
   const Surface boards = make_boards(0.0f);
