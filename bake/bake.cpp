@@ -190,6 +190,12 @@ uint64_t least_bytes(const VolumeSize& volume, const Surface& voxelized, const S
   return bytes - bytes / 3;  // what long lines leave, and the estimate's own error
 }
 
+/// Less than what a level takes whose walls are wrapped.
+uint64_t least_shell_bytes(const Surface& wall, double resolution) {
+  constexpr uint64_t kTriangle = 20, kTrianglesPerVoxel = 8;  // front and back at edges of half a voxel: up to 18
+  return kTriangle * kTrianglesPerVoxel * mark_voxels(wall, {dvec3(0.0), resolution}).size();
+}
+
 /// All vertices and stored voxels of a level.
 void add_to_hull(const LevelView& level, SlabHull& hull) {
   for (const vec3& position : level.positions) hull.add(position);
@@ -282,7 +288,10 @@ class Baker {
     FARFIELD_TRY_LET(const SurfaceOrder order, simplify_surface(level, resolution, level_report));
     if (options_.job.is_cancelled()) return cancelled();
 
-    FARFIELD_TRY_LET(auto volume, voxelize_rest(level, resolution, level_report));
+    LevelData volume;
+    if (!level_report.worthless) {
+      FARFIELD_TRY_LET(volume, voxelize_rest(level, resolution, level_report));
+    }
 
     options_.job.report(share_done(level, 0.98), fmt::format("level {}: write", level));
     const Stopwatch watch;
@@ -334,7 +343,7 @@ class Baker {
     unwrap_walls(resolution, is_macrosurface);
     SplitSurface parts = split(surface_, is_macrosurface, sub_resolution_);
     const size_t first_shell_face = parts.macrosurface.triangles.size();
-    FARFIELD_TRY(wrap_walls(resolution, parts.macrosurface));
+    FARFIELD_TRY(wrap_walls(level, resolution, parts.macrosurface, level_report));
     level_report.macrosurface_triangles = parts.macrosurface.triangles.size();
     level_report.voxelized_triangles = sub_resolution_.triangles.size();
     level_report.analysis_seconds = analysis.seconds();
@@ -357,7 +366,10 @@ class Baker {
 
   /// Takes the surface around the last level's walls away. Pieces stay in wall_ where it still is macrosurface.
   void unwrap_walls(double resolution, std::vector<uint8_t>& is_macrosurface) {
-    if (wall_.triangles.empty()) return;
+    if (is_shell_.empty()) {  // there are none, or no level was worth wrapping them
+      append(std::exchange(wall_, {}), sub_resolution_);
+      return;
+    }
     std::vector<uint8_t> is_wall_still = is_macrosurface, is_other = is_shell_, is_other_macrosurface;
     for (size_t f = 0; f < is_shell_.size(); ++f) {
       is_wall_still[f] &= is_shell_[f];
@@ -376,13 +388,16 @@ class Baker {
 
   /// Wraps what looks like a wall at this resolution or did before. Levels are wrapped afresh, as volumes are made
   /// afresh.
-  Result<void> wrap_walls(double resolution, Surface& macrosurface) {
+  Result<void> wrap_walls(uint32_t level, double resolution, Surface& macrosurface, LevelReport& level_report) {
     FARFIELD_TRY_LET(auto is_wall, find_walls(sub_resolution_, resolution));
     if (std::ranges::find(is_wall, 1) != is_wall.end()) {
       for (uint8_t& is : is_wall) is = !is;
       sub_resolution_ = compact(split(sub_resolution_, is_wall, wall_).macrosurface);
     }
     if (wall_.triangles.empty()) return {};
+    level_report.worthless =
+        level != last_level_ && least_shell_bytes(wall_, resolution) > most_bytes_worth_writing(level);
+    if (level_report.worthless) return {};
     FARFIELD_TRY_LET(const Surface shell, wrap_wall(wall_, resolution));
     if (shell.triangles.empty()) append(std::exchange(wall_, {}), sub_resolution_);
     append(shell, macrosurface);
@@ -391,7 +406,7 @@ class Baker {
 
   /// Which faces of surface_ came from `first_shell_face` or later.
   void note_shell(size_t first_shell_face, const SimplifyResult& simplified, const SurfaceOrder& order) {
-    if (wall_.triangles.empty()) return;
+    if (wall_.triangles.empty() || first_shell_face == simplified.face_map.size()) return;
     is_shell_.assign(surface_.triangles.size(), 0);
     for (size_t f = first_shell_face; f < simplified.face_map.size(); ++f) {
       if (simplified.face_map[f] != kMorphCollapsed) is_shell_[order.face_number[simplified.face_map[f]]] = 1;

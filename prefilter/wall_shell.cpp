@@ -167,23 +167,25 @@ const FaceMaterial& no_material() {
   return none;
 }
 
-/// The same spread of normals, but around this one. Steps of a wall that rise towards one side are many in number and
-/// their edges few, but all together catch as much light as the plane through them: main directions would be too
-/// bright.
+/// The same spread of normals, but around this one. Steps of a tight wall that rise towards one side are many and their
+/// edges few, but all together they catch as much light as the plane through them: their main direction would be too
+/// bright. (Of a loose wall they do not: light falls in between.)
 SymMat3 around(const vec3& normal, const SymMat3& sggx) {
   const float along = sggx.quadratic(normal), aside = 0.5f * (sggx.trace() - along);
   return SymMat3::outer(normal) * (along - aside) + SymMat3::identity() * aside;
 }
 
+void turn_normals_to(const vec3& normal, FaceMaterial& m) {
+  m.sggx = around(normal, m.sggx);
+  if (m.shading_sggx.trace() > 0) m.shading_sggx = around(normal, m.shading_sggx);
+}
+
 /// The mean of what was seen, without the light that stays between the pieces: of light that meets others of them, as
 /// much comes back as cluster_albedo() says where a share of `usual_escape` gets away at once. Linear in what a face's
 /// few rays say, so that their noise does no harm.
-FaceMaterial mean_of(const Seen& seen, float usual_escape, const vec3& normal) {
+FaceMaterial mean_of(const Seen& seen, float usual_escape) {
   FaceMaterial m = mix(seen.sum, 1 / seen.hits, seen.sum, 0.0f);
   m.opacity = 1;
-  const SymMat3 none{};
-  m.sggx = around(normal, m.sggx);
-  if (!(m.shading_sggx == none)) m.shading_sggx = around(normal, m.shading_sggx);
   const float caught = 1 - seen.escaped / seen.hits;
   const vec3 albedo = glm::min(layered_albedo(m.specular, m.diffuse + m.transmission), vec3(1.0f));
   const vec3 absorbed = vec3(1.0f) - albedo;
@@ -314,8 +316,12 @@ Result<Surface> wrap_wall(const Surface& wall, double resolution) {
   Surface result = shell.surface;
   for (size_t f = 0; f < seen.size(); ++f) {
     const Seen& own = seen[f].hits > 0 ? seen[f] : all;
-    FaceMaterial m = mean_of(own, all.escaped / all.hits, shell.outwards[f]);
-    if (!is_tight) m.gap = 1 - seen[f].hits / seen[f].rays;
+    FaceMaterial m = mean_of(own, all.escaped / all.hits);
+    if (is_tight) {
+      turn_normals_to(shell.outwards[f], m);
+    } else {
+      m.gap = 1 - seen[f].hits / seen[f].rays;
+    }
     result.materials.push_back(m);
   }
   return result;
