@@ -34,6 +34,8 @@
 #include "prefilter/resolve.h"
 #include "prefilter/simplify.h"
 #include "prefilter/voxelize.h"
+#include "prefilter/wall_shell.h"
+#include "prefilter/walls.h"
 
 namespace farfield {
 namespace {
@@ -156,6 +158,22 @@ SplitSurface split(const Surface& surface, const std::vector<uint8_t>& is_macros
   return result;
 }
 
+/// Without the vertices that no face uses.
+Surface compact(const Surface& surface) {
+  Surface result;
+  result.origin = surface.origin;
+  split(surface, std::vector<uint8_t>(surface.triangles.size(), 0), result);
+  return result;
+}
+
+/// Adds a surface of the same origin that shares no vertex.
+void append(const Surface& added, Surface& surface) {
+  const auto first = static_cast<uint32_t>(surface.positions.size());
+  surface.positions.insert(surface.positions.end(), added.positions.begin(), added.positions.end());
+  for (const uvec3& t : added.triangles) surface.triangles.push_back(t + first);
+  surface.materials.insert(surface.materials.end(), added.materials.begin(), added.materials.end());
+}
+
 /// Less than what a level with such a volume and surface has resident.
 uint64_t least_bytes(const VolumeSize& volume, const Surface& voxelized, const Surface& surface) {
   constexpr uint64_t kTriangle = 20;  // a BVH of quads takes more, without any array of ours
@@ -170,6 +188,12 @@ uint64_t least_bytes(const VolumeSize& volume, const Surface& voxelized, const S
   const uint64_t bytes =
       per_voxel * volume.voxels + sizeof(Brick) * volume.bricks + kTriangle * surface.triangles.size();
   return bytes - bytes / 3;  // what long lines leave, and the estimate's own error
+}
+
+/// Less than what a level takes whose walls are wrapped.
+uint64_t least_shell_bytes(const Surface& wall, double resolution) {
+  constexpr uint64_t kTriangle = 20, kTrianglesPerVoxel = 8;  // front and back at edges of half a voxel: up to 18
+  return kTriangle * kTrianglesPerVoxel * mark_voxels(wall, {dvec3(0.0), resolution}).size();
 }
 
 /// All vertices and stored voxels of a level.
@@ -261,10 +285,13 @@ class Baker {
       FARFIELD_TRY(resolve_source(level, resolution));
     }
 
-    const SurfaceOrder order = simplify_surface(level, resolution, level_report);
+    FARFIELD_TRY_LET(const SurfaceOrder order, simplify_surface(level, resolution, level_report));
     if (options_.job.is_cancelled()) return cancelled();
 
-    FARFIELD_TRY_LET(auto volume, voxelize_rest(level, resolution, level_report));
+    LevelData volume;
+    if (!level_report.worthless) {
+      FARFIELD_TRY_LET(volume, voxelize_rest(level, resolution, level_report));
+    }
 
     options_.job.report(share_done(level, 0.98), fmt::format("level {}: write", level));
     const Stopwatch watch;
@@ -309,21 +336,25 @@ class Baker {
   }
 
   /// Steps A and S: what is no longer surface at this resolution leaves surface_, the rest is simplified.
-  SurfaceOrder simplify_surface(uint32_t level, double resolution, LevelReport& level_report) {
+  Result<SurfaceOrder> simplify_surface(uint32_t level, double resolution, LevelReport& level_report) {
     options_.job.report(share_done(level, 0), fmt::format("level {}: analyse", level));
     const Stopwatch analysis;
-    const auto is_macrosurface = classify_macrosurface(surface_, static_cast<float>(resolution));
-    const SplitSurface parts = split(surface_, is_macrosurface, sub_resolution_);
+    auto is_macrosurface = classify_macrosurface(surface_, static_cast<float>(resolution));
+    unwrap_walls(resolution, is_macrosurface);
+    SplitSurface parts = split(surface_, is_macrosurface, sub_resolution_);
+    const size_t first_shell_face = parts.macrosurface.triangles.size();
+    FARFIELD_TRY(wrap_walls(level, resolution, parts.macrosurface, level_report));
     level_report.macrosurface_triangles = parts.macrosurface.triangles.size();
     level_report.voxelized_triangles = sub_resolution_.triangles.size();
     level_report.analysis_seconds = analysis.seconds();
-    if (options_.job.is_cancelled()) return {};
+    if (options_.job.is_cancelled()) return cancelled();
 
     options_.job.report(share_done(level, 0.03), fmt::format("level {}: simplify", level));
     const Stopwatch simplification;
     const SimplifyResult simplified = simplify(parts.macrosurface, {.resolution = static_cast<float>(resolution)});
     SurfaceOrder order = order_surface(simplified.surface);
     surface_ = reorder(simplified.surface, order);
+    note_shell(first_shell_face, simplified, order);
     compose(from_stored_.vertex, simplified.vertex_map);
     compose(from_stored_.vertex, order.vertex_number);
     compose(from_stored_.face, parts.macro_face);
@@ -331,6 +362,55 @@ class Baker {
     compose(from_stored_.face, order.face_number);
     level_report.simplify_seconds = simplification.seconds();
     return order;
+  }
+
+  /// Takes the surface around the last level's walls away. Pieces stay in wall_ where it still is macrosurface.
+  void unwrap_walls(double resolution, std::vector<uint8_t>& is_macrosurface) {
+    if (is_shell_.empty()) {  // there are none, or no level was worth wrapping them
+      append(std::exchange(wall_, {}), sub_resolution_);
+      return;
+    }
+    std::vector<uint8_t> is_wall_still = is_macrosurface, is_other = is_shell_, is_other_macrosurface;
+    for (size_t f = 0; f < is_shell_.size(); ++f) {
+      is_wall_still[f] &= is_shell_[f];
+      is_other[f] = !is_shell_[f];
+      if (is_other[f]) is_other_macrosurface.push_back(is_macrosurface[f]);
+    }
+    const auto stays = find_near(wall_, surface_, is_wall_still, 0.5 * resolution);
+    Surface shell;
+    wall_ = compact(split(wall_, stays, sub_resolution_).macrosurface);
+    SplitSurface parts = split(surface_, is_other, shell);
+    surface_ = std::move(parts.macrosurface);
+    compose(from_stored_.face, parts.macro_face);
+    is_macrosurface = std::move(is_other_macrosurface);
+    is_shell_ = {};
+  }
+
+  /// Wraps what looks like a wall at this resolution or did before. Levels are wrapped afresh, as volumes are made
+  /// afresh.
+  Result<void> wrap_walls(uint32_t level, double resolution, Surface& macrosurface, LevelReport& level_report) {
+    FARFIELD_TRY_LET(auto is_wall, find_walls(sub_resolution_, resolution));
+    if (std::ranges::find(is_wall, 1) != is_wall.end()) {
+      for (uint8_t& is : is_wall) is = !is;
+      sub_resolution_ = compact(split(sub_resolution_, is_wall, wall_).macrosurface);
+    }
+    if (wall_.triangles.empty()) return {};
+    level_report.worthless =
+        level != last_level_ && least_shell_bytes(wall_, resolution) > most_bytes_worth_writing(level);
+    if (level_report.worthless) return {};
+    FARFIELD_TRY_LET(const Surface shell, wrap_wall(wall_, resolution));
+    if (shell.triangles.empty()) append(std::exchange(wall_, {}), sub_resolution_);
+    append(shell, macrosurface);
+    return {};
+  }
+
+  /// Which faces of surface_ came from `first_shell_face` or later.
+  void note_shell(size_t first_shell_face, const SimplifyResult& simplified, const SurfaceOrder& order) {
+    if (wall_.triangles.empty() || first_shell_face == simplified.face_map.size()) return;
+    is_shell_.assign(surface_.triangles.size(), 0);
+    for (size_t f = first_shell_face; f < simplified.face_map.size(); ++f) {
+      if (simplified.face_map[f] != kMorphCollapsed) is_shell_[order.face_number[simplified.face_map[f]]] = 1;
+    }
   }
 
   /// Step V, or its result from an interrupted bake.
@@ -443,10 +523,12 @@ class Baker {
   SurfaceOrder source_order_;  ///< of level 0
   AssetLook look_;
   std::vector<double> texel_areas_;
-  bool is_resolved_ = false;  ///< from then on surface_ is there
-  Surface surface_;           ///< of the level at hand, in final order
-  Surface sub_resolution_;    ///< all that has left the surface so far
-  MorphMaps from_stored_;     ///< from the last written level to surface_
+  bool is_resolved_ = false;       ///< from then on surface_ is there
+  Surface surface_;                ///< of the level at hand, in final order
+  Surface sub_resolution_;         ///< all that has left the surface so far, but for wall_
+  Surface wall_;                   ///< pieces of the walls that are wrapped at the level at hand
+  std::vector<uint8_t> is_shell_;  ///< faces of surface_ that are such walls
+  MorphMaps from_stored_;          ///< from the last written level to surface_
   SlabHull hull_;
   dvec3 middle_{0.0};  ///< of the source's bounds
   uint32_t last_level_ = 0;

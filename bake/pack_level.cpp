@@ -251,6 +251,8 @@ void pack_surface(const Surface& surface, const SurfaceOrder& order, LevelData& 
   level.face_emission = pack_each<PackedRadiance>(materials, [](const auto& m) { return pack_radiance(m.emission); });
   drop_if_all(level.face_opacity, uint8_t{255});
   drop_if_all(level.face_emission, PackedRadiance{});
+  level.face_gap = pack_each<uint8_t>(materials, [](const auto& m) { return pack_unorm8(m.gap); });
+  drop_if_all(level.face_gap, uint8_t{0});
   if (!level.face_specular.empty()) {
     level.face_roughness2 = pack_each<uint8_t>(materials, [](const auto& m) { return pack_unorm8(m.roughness2); });
   }

@@ -9,9 +9,25 @@
 namespace farfield {
 namespace {
 
+/// Whether the path of a ray passes between the pieces that a face stands for. All faces within a few resolutions give
+/// the same path the same answer: a wall's front and back have the same gaps, and so have camera and shadow rays.
+bool passes_gap(const TracedLevel& level, const RayContext& context, const EmbreeRay& ray, uint32_t face) {
+  constexpr float kCell = 4;  // resolutions
+  if (level.view.face_gap.empty()) return false;
+  const uint8_t gap = level.view.face_gap[face];
+  if (gap == 0) return false;
+  const vec3 at = vec3(ray.org_x, ray.org_y, ray.org_z) + ray.tfar * vec3(ray.dir_x, ray.dir_y, ray.dir_z);
+  const vec3 cell = glm::floor(at / (kCell * level.view.header.resolution));
+  uint64_t bits = context.path_seed;
+  for (int axis = 0; axis < 3; ++axis) bits = mix64(bits, std::bit_cast<uint32_t>(cell[axis] + 0.0f));
+  return to_unit_float(bits) < unpack_unorm8(gap);
+}
+
 /// Whether a ray of ours stops at a face that is not opaque everywhere. The same ray gets the same answer.
 bool stops(const TracedLevel& level, const RayContext& context, const EmbreeRay& ray, const EmbreeHit& hit) {
   const uint32_t face = level.face_of(hit.primID, quad_side(hit.u, hit.v));
+  if (passes_gap(level, context, ray, face)) return false;
+  if (level.view.face_opacity.empty()) return true;
   const uint8_t average = level.view.face_opacity[face];
   if (average == 255 || average == 0) return average == 255;
   float opacity = unpack_unorm8(average);
@@ -25,8 +41,8 @@ bool stops(const TracedLevel& level, const RayContext& context, const EmbreeRay&
   return to_unit_float(bits) < opacity;
 }
 
-/// Embree asks it about every hit on a level whose faces are not all opaque. Such rays are single: InstanceGeometry
-/// takes packets apart.
+/// Embree asks it about every hit on a level whose faces are not all opaque and whole. Such rays are single:
+/// InstanceGeometry takes packets apart.
 void opacity_filter(const EmbreeFilterArguments* args) {
   if (args->valid[0] != -1) return;
   const auto& level = *static_cast<const TracedLevel*>(args->geometryUserPtr);
@@ -47,7 +63,7 @@ Result<std::unique_ptr<TracedLevel>> TracedLevel::build(BvhDevice& device, const
   traced->face_count = farfield::face_count(level);
   traced->voxel_count = farfield::voxel_count(level);
   traced->look = look;
-  const bool is_opaque = level.face_opacity.empty();
+  const bool is_opaque = level.face_opacity.empty() && level.face_gap.empty();
   FARFIELD_TRY_LET(traced->scene, LevelScene::build(device, level, is_opaque ? nullptr : opacity_filter, traced.get()));
   return traced;
 }

@@ -152,7 +152,9 @@ inline ivec3 brick_coordinates(const LevelHeader& header, uint64_t table_index) 
   ARRAY(24, CornerVertex,       corner_vertex,        uvec3,             Faces)         /* shading vertices */       \
   ARRAY(25, ShadingNormal,      shading_normal,       PackedNormal,      ShadingVertices) /* the face's own */       \
   ARRAY(26, ShadingUv,          shading_uv,           vec2,              ShadingVertices) /* v down; none */         \
-  ARRAY(27, ShadingColor,       shading_color,        PackedVertexColor, ShadingVertices) /* white */
+  ARRAY(27, ShadingColor,       shading_color,        PackedVertexColor, ShadingVertices) /* white */                 \
+  /* walls made of pieces */                                                                                          \
+  ARRAY(28, FaceGap,            face_gap,             uint8_t,           Faces)         /* unorm8; 0 */
 // clang-format on
 
 /// The arrays, owned (Array = std::vector<T>) while baking, or as spans into a mapped file at run time.

@@ -43,7 +43,8 @@ Result<OpacityScene> OpacityScene::build(const Surface& geometry) {
 OpacityScene::OpacityScene(const Surface& geometry, RayScene scene)
     : geometry_(&geometry),
       scene_(std::move(scene)),
-      is_opaque_(std::ranges::all_of(geometry.materials, [](const FaceMaterial& m) { return m.opacity >= 1; })) {}
+      is_opaque_(
+          std::ranges::all_of(geometry.materials, [](const FaceMaterial& m) { return m.stopped_share() >= 1; })) {}
 
 std::optional<RayHit> OpacityScene::first_stop(const vec3& origin, const vec3& direction, float far,
                                                SplitMix& random) const {
@@ -55,7 +56,7 @@ std::optional<RayHit> OpacityScene::first_stop(const vec3& origin, const vec3& d
   while (near <= far) {
     const auto hit = scene_.first_hit(origin, direction, near, far);
     if (!hit) return {};
-    const float opacity = geometry_->materials[hit->triangle].opacity;
+    const float opacity = geometry_->materials[hit->triangle].stopped_share();
     if (opacity >= 1 || to_unit_float(random.next()) < opacity) return hit;
     near = std::nextafter(hit->distance, std::numeric_limits<float>::infinity());
   }

@@ -22,6 +22,10 @@ struct FaceMaterial {
   SymMat3 shading_sggx;     ///< the same of shading normals; 0 on all faces of a surface that has no such normals
   float opacity = 1.0f;     ///< share of rays that the face stops
   vec3 emission{0.0f};      ///< linear radiance of both sides, >= 0, may exceed 1
+  float gap = 0.0f;         ///< share of paths that pass between the pieces that the face stands for
+
+  /// The share of rays that the face stops.
+  float stopped_share() const { return opacity * (1 - gap); }
 };
 
 /// A triangle soup or mesh with shared vertices. Winding may be inconsistent; faces are two-sided.

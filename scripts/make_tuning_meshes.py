@@ -7,6 +7,9 @@
 rigging.obj  ropes of 6 sides between masts and yards, and ratlines: thin, long, aligned.
 planks.obj   three decks of 60 boards with gaps of a tenth of their width.
 conifer.obj  a tree of needles: clumps of clumps, no leaf as wide as a voxel.
+shingles.obj a ridge roof of shingles that overlap, of uneven widths (docs/decisions/0014).
+slats.obj    sheets without thickness, with gaps of 4 %, in a slanted plane.
+barrel.obj   a round wall of staves, with gaps of 3 %.
 """
 import math
 import random
@@ -85,6 +88,61 @@ def planks():
     return mesh
 
 
+def shingles():
+    """Two slopes of 25 degrees; a shingle is as thick as a tenth of its length."""
+    mesh, rng = Mesh(), random.Random(11)
+    rise, run = math.sin(math.radians(25)), math.cos(math.radians(25))
+    for slope in (-1, 1):
+        for row in range(24):
+            x = -6 - rng.uniform(0, 0.5)
+            while x < 6:
+                width = rng.uniform(0.3, 0.6)
+                corners = []
+                for along, up in ((0.25 * row, 0.05), (0.25 * row + 0.4, 0.0)):
+                    for dx in (0.01, width - 0.01):
+                        for lift in (0.0, 0.04):
+                            corners.append([x + dx, along * rise + (up + lift) * run, slope * (6 - along * run + (up + lift) * rise)])
+                first = len(mesh.points) + 1
+                mesh.points += corners
+                for face in ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)):
+                    mesh.faces.append([first + i for i in face])
+                x += width
+    return mesh
+
+
+def slats():
+    mesh = Mesh()
+    for i in range(100):
+        first = len(mesh.points) + 1
+        for along, across in ((0, 0), (6, 0), (6, 0.096), (0, 0.096)):
+            v = 0.1 * i + across
+            mesh.points.append([along, 0.8 * v, 0.6 * v + 0.2 * along])
+        mesh.faces.append([first + k for k in range(4)])
+    return mesh
+
+
+def barrel():
+    mesh = Mesh()
+    staves, bands = 90, 12
+    for i in range(staves):
+        first = len(mesh.points) + 1
+        for k in range(bands + 1):
+            height = k / bands
+            radius = 2 + 0.5 * math.sin(math.pi * height)
+            for r in (radius, radius + 0.05):
+                for turn in (i, i + 0.97):
+                    angle = 2 * math.pi * turn / staves
+                    mesh.points.append([r * math.cos(angle), 5 * height, r * math.sin(angle)])
+        for k in range(bands):
+            a = first + 4 * k
+            mesh.faces += [[a, a + 1, a + 5, a + 4], [a + 2, a + 6, a + 7, a + 3], [a, a + 4, a + 6, a + 2],
+                           [a + 1, a + 3, a + 7, a + 5]]
+        mesh.faces += [[first, first + 2, first + 3, first + 1]]
+        last = first + 4 * bands
+        mesh.faces += [[last, last + 1, last + 3, last + 2]]
+    return mesh
+
+
 def conifer(seed=3):
     mesh, rng = Mesh(), random.Random(seed)
     mesh.tube((0, 0, 0), (0, 10, 0), 0.12, 8)
@@ -111,7 +169,7 @@ def conifer(seed=3):
 def main():
     out = Path(sys.argv[1])
     out.mkdir(parents=True, exist_ok=True)
-    for make in (rigging, planks, conifer):
+    for make in (rigging, planks, conifer, shingles, slats, barrel):
         make().write(out / (make.__name__ + ".obj"))
 
 

@@ -92,6 +92,19 @@ ImportedAsset ball_in_leaves() {
   return test::asset_of(surface, 77);
 }
 
+/// 24 sheets of 1 x 24 with gaps of 0.06, of 24 quads each.
+ImportedAsset boards() {
+  Surface surface;
+  for (uint32_t board = 0; board < 24; ++board) {
+    const Surface sheet = test::make_plane(1, 24, 0.94f, 24.0f);
+    const auto first = static_cast<uint32_t>(surface.positions.size());
+    for (const vec3& p : sheet.positions) surface.positions.push_back(p + vec3(board, 0, 0));
+    for (const uvec3& t : sheet.triangles) surface.triangles.push_back(t + first);
+  }
+  test::add_materials(surface);
+  return test::asset_of(surface, 78);
+}
+
 ImportedAsset two_triangles(float grey = 0.5f) {
   Surface surface;
   surface.positions = {vec3(0), vec3(4, 0, 0), vec3(4, 4, 0), vec3(0, 4, 0)};
@@ -415,6 +428,17 @@ TEST_F(Bake, OfAGroundPlaneIsJustItsSource) {
   ASSERT_EQ(report->manifest.levels.size(), 1u);
   EXPECT_EQ(report->manifest.levels[0].triangles, 2u);
   EXPECT_EQ(files_of(out()).size(), 2u);
+}
+
+TEST_F(Bake, OfBoardsWithNarrowGapsStaysASurface) {
+  const auto report = bake(boards(), "boards.obj", out(), small_options());
+  ASSERT_TRUE(report) << report.error().message;
+  const auto levels = open_levels(out());
+  ASSERT_GT(levels.size(), 1u);
+  for (const auto& level : levels) {
+    EXPECT_TRUE(level->view().has_surface());
+    EXPECT_FALSE(level->view().has_volume());
+  }
 }
 
 TEST_F(Bake, OfTheSourceOnlyHasNoOtherLevel) {

@@ -141,7 +141,13 @@ TEST(LevelFormat, GoldenBytesOfVersion2AreFrozen) {
 }
 
 TEST(LevelFormat, GoldenBytesOfVersion3AreFrozen) {
-  expect_frozen("/format_v3/level_3.ffl", 3264u, test::full_level_of_version_3());
+  expect_frozen("/format_v3/level_3.ffl", 4288u, test::full_level_of_version_3());
+}
+
+TEST(LevelFormat, GapsMustBelongToFaces) {
+  LevelData level = test::full_level_of_version_3();
+  level.face_gap.pop_back();
+  EXPECT_EQ(find_structure_problem(view_of(level)).value_or(""), "face_gap has 2 elements for 3 faces");
 }
 
 TEST(LevelFile, CornersMustReferToShadingVertices) {

@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: Apache-2.0
+// The boundary of the voxels that the wall touches, shrunk onto it. Voxels close gaps that are narrower than they are.
+#include "prefilter/wall_shell.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <unordered_map>
+
+#include "base/hash.h"
+#include "base/parallel.h"
+#include "base/split_mix.h"
+#include "prefilter/material_filter.h"
+#include "prefilter/ray_scene.h"
+#include "prefilter/triangle_pieces.h"
+#include "prefilter/vertex_placement.h"
+#include "prefilter/voxel_marks.h"
+#include "scattering/albedo.h"
+#include "scattering/warp.h"
+
+namespace farfield {
+namespace {
+
+constexpr double kCell = 0.25;  ///< of the resolution: voxels, and the widest gap that is closed for sure
+constexpr uint32_t kRaysPerFace = 4;
+constexpr float kLeastCosine = 0.15f;  ///< rays that are flatter are cast at this angle
+constexpr float kLeastGap = 0.015f;    ///< share of rays through the wall below which it counts as tight
+constexpr float kEscapeLength = 1;     ///< in resolutions: how far light must get away
+
+/// Which voxels a set holds.
+class VoxelLookup {
+ public:
+  explicit VoxelLookup(const VoxelSet& set) {
+    for (size_t i = 0; i < set.coordinates.size(); ++i) mask_of_[cell_key(set.coordinates[i])] = &set.masks[i];
+  }
+  bool contains(const ivec3& v) const {
+    const auto found = mask_of_.find(cell_key({v.x >> 3, v.y >> 3, v.z >> 3}));
+    return found != mask_of_.end() &&
+           ((*found->second)[static_cast<size_t>(v.z & 7)] >> ((v.x & 7) + 8 * (v.y & 7)) & 1);
+  }
+
+ private:
+  std::unordered_map<uint64_t, const VoxelMask*> mask_of_;
+};
+
+/// The faces between voxels of a set and others, wound so that normals point out of the set.
+class Boundary {
+ public:
+  explicit Boundary(const VoxelSet& set) {
+    const VoxelLookup lookup(set);
+    for (size_t b = 0; b < set.coordinates.size(); ++b) {
+      for (int i = 0; i < kBrickVoxels; ++i) {
+        if (!(set.masks[b][static_cast<size_t>(i >> 6)] >> (i & 63) & 1)) continue;
+        const ivec3 voxel = set.coordinates[b] * kBrickSide + ivec3(i & 7, i >> 3 & 7, i >> 6);
+        for (int axis = 0; axis < 3; ++axis) {
+          for (const int side : {0, 1}) {
+            ivec3 neighbour = voxel;
+            neighbour[axis] += side ? 1 : -1;
+            if (!lookup.contains(neighbour)) add_quad(voxel, axis, side);
+          }
+        }
+      }
+    }
+  }
+
+  std::vector<ivec3> corners;  ///< of voxels
+  std::vector<uvec3> triangles;
+
+ private:
+  void add_quad(const ivec3& voxel, int axis, int side) {
+    ivec3 u(0), v(0), at = voxel;
+    u[(axis + 1) % 3] = v[(axis + 2) % 3] = 1;
+    at[axis] += side;
+    if (!side) std::swap(u, v);
+    const uint32_t a = vertex(at), b = vertex(at + u), c = vertex(at + u + v), d = vertex(at + v);
+    triangles.emplace_back(a, b, c);
+    triangles.emplace_back(a, c, d);
+  }
+  uint32_t vertex(const ivec3& corner) {
+    const auto [place, is_new] = vertex_of_.try_emplace(cell_key(corner), static_cast<uint32_t>(corners.size()));
+    if (is_new) corners.push_back(corner);
+    return place->second;
+  }
+  std::unordered_map<uint64_t, uint32_t> vertex_of_;
+};
+
+/// The wall's triangles in pieces no longer than a voxel, by the voxel of their middle. In voxel units.
+class NearestPoint {
+ public:
+  NearestPoint(const Surface& wall, const VoxelLattice& lattice) {
+    for (size_t face = 0; face < wall.triangles.size(); ++face) {
+      TrianglePiece t = corners_of(wall, face);
+      for (dvec3& p : t) p = (p - lattice.origin) / lattice.voxel_size;
+      for_each_piece(t, 1, [&](const TrianglePiece& piece) {
+        pieces_[cell_key(ivec3(glm::floor(middle_of(piece))))].push_back(piece);
+      });
+    }
+    for_each_cell_around(ivec3(0), kReach, [&](const ivec3& offset) {
+      around_.push_back({offset, distance_to_voxel(offset)});
+    });
+    std::ranges::stable_sort(around_, {}, &Neighbour::distance);
+  }
+
+  /// The wall's nearest point to a corner of one of its voxels; the corner itself if there is none nearby.
+  dvec3 to(const ivec3& corner) const {
+    const dvec3 p(corner);
+    dvec3 nearest = p;
+    double distance = std::numeric_limits<double>::infinity();
+    for (const Neighbour& neighbour : around_) {
+      if (neighbour.distance - kMiddleToCorner > distance) break;
+      const auto found = pieces_.find(cell_key(corner + neighbour.offset));
+      if (found == pieces_.end()) continue;
+      for (const TrianglePiece& t : found->second) {
+        if (glm::length(middle_of(t) - p) - kMiddleToCorner > distance) continue;
+        const dvec3 weight = closest_barycentric(p, t[0], t[1], t[2]);
+        const dvec3 point = weight.x * t[0] + weight.y * t[1] + weight.z * t[2];
+        if (glm::length(point - p) < distance) distance = glm::length(point - p), nearest = point;
+      }
+    }
+    return nearest;
+  }
+
+ private:
+  static constexpr int kReach = 3;                      ///< voxels: mark_voxels() also marks what it passes by
+  static constexpr double kMiddleToCorner = 2.0 / 3.0;  ///< of a piece whose edges are at most 1 long
+  struct Neighbour {
+    ivec3 offset;
+    double distance;
+  };
+
+  static double distance_to_voxel(const ivec3& offset) {
+    return glm::length(glm::max(glm::max(dvec3(offset), -dvec3(offset + 1)), dvec3(0)));
+  }
+
+  std::unordered_map<uint64_t, std::vector<TrianglePiece>> pieces_;
+  std::vector<Neighbour> around_;  ///< voxels around a corner, near ones first
+};
+
+/// The same triangles in pieces: rays find their way through long planks ten times as fast.
+Surface in_pieces(const Surface& wall, double longest) {
+  Surface result;
+  for (size_t face = 0; face < wall.triangles.size(); ++face) {
+    for_each_piece(corners_of(wall, face), longest, [&](const TrianglePiece& piece) {
+      const auto first = static_cast<uint32_t>(result.positions.size());
+      for (const dvec3& p : piece) result.positions.emplace_back(p);
+      result.triangles.emplace_back(first, first + 1, first + 2);
+      result.materials.push_back(wall.materials[face]);
+    });
+  }
+  return result;
+}
+
+/// What rays from outside see of the wall.
+struct Seen {
+  FaceMaterial sum;
+  float rays = 0, hits = 0, escaped = 0;
+};
+
+const FaceMaterial& no_material() {
+  static const FaceMaterial none = [] {
+    FaceMaterial m;
+    m.roughness2 = m.opacity = 0;
+    return m;
+  }();
+  return none;
+}
+
+/// The same spread of normals, but around this one. Steps of a tight wall that rise towards one side are many and their
+/// edges few, but all together they catch as much light as the plane through them: their main direction would be too
+/// bright. (Of a loose wall they do not: light falls in between.)
+SymMat3 around(const vec3& normal, const SymMat3& sggx) {
+  const float along = sggx.quadratic(normal), aside = 0.5f * (sggx.trace() - along);
+  return SymMat3::outer(normal) * (along - aside) + SymMat3::identity() * aside;
+}
+
+void turn_normals_to(const vec3& normal, FaceMaterial& m) {
+  m.sggx = around(normal, m.sggx);
+  if (m.shading_sggx.trace() > 0) m.shading_sggx = around(normal, m.shading_sggx);
+}
+
+/// The mean of what was seen, without the light that stays between the pieces: of light that meets others of them, as
+/// much comes back as cluster_albedo() says where a share of `usual_escape` gets away at once. Linear in what a face's
+/// few rays say, so that their noise does no harm.
+FaceMaterial mean_of(const Seen& seen, float usual_escape) {
+  FaceMaterial m = mix(seen.sum, 1 / seen.hits, seen.sum, 0.0f);
+  m.opacity = 1;
+  const float caught = 1 - seen.escaped / seen.hits;
+  const vec3 albedo = glm::min(layered_albedo(m.specular, m.diffuse + m.transmission), vec3(1.0f));
+  const vec3 absorbed = vec3(1.0f) - albedo;
+  const vec3 gain = vec3(1.0f) - caught * absorbed / glm::max(absorbed + albedo * usual_escape, vec3(1e-6f));
+  m.diffuse *= gain;
+  m.specular *= gain;
+  m.transmission *= gain;
+  return m;
+}
+
+/// Looks at the wall from faces around it.
+class WallViewer {
+ public:
+  WallViewer(const OpacityScene& wall, double resolution) : wall_(wall), resolution_(static_cast<float>(resolution)) {}
+
+  Seen look_at(const TrianglePiece& face, const vec3& outwards, uint64_t seed) const {
+    Seen seen;
+    seen.sum = no_material();
+    SplitMix random(seed);
+    for (uint32_t i = 0; i < kRaysPerFace; ++i) look(face, outwards, random, seen);
+    return seen;
+  }
+
+ private:
+  void look(const TrianglePiece& face, const vec3& outwards, SplitMix& random, Seen& seen) const {
+    const float root = std::sqrt(static_cast<float>(random.next_unit())),
+                along = static_cast<float>(random.next_unit());
+    const vec3 at = vec3(face[0]) * (1 - root) + vec3(face[1]) * (root * (1 - along)) + vec3(face[2]) * (root * along);
+    const vec3 away = lobe(outwards, random);
+    const float start = 0.5f * resolution_ / std::max(glm::dot(away, outwards), kLeastCosine);
+    seen.rays += 1;
+    const vec3 origin = at + start * away;
+    const auto hit = wall_.first_stop(origin, -away, 3 * start, random);
+    if (!hit) return;
+    const FaceMaterial& m = wall_.surface().materials[hit->triangle];
+    seen.hits += 1;
+    seen.sum = mix(seen.sum, 1, m, 1);
+    const float length = glm::length(hit->normal);
+    if (!(length > 0)) return;
+    const vec3 normal = hit->normal / length;
+    const vec3 on = lobe(glm::dot(normal, away) > 0 ? normal : -normal, random);
+    const vec3 point = origin - hit->distance * away;
+    const bool is_stopped = wall_.is_stopped(point, on, 1e-4f * resolution_, kEscapeLength * resolution_, random);
+    if (!is_stopped) seen.escaped += 1;
+  }
+
+  static vec3 lobe(const vec3& normal, SplitMix& random) {
+    const float u1 = to_unit_float(random.next()), u2 = to_unit_float(random.next());
+    return cosine_lobe(normal, u1, u2);
+  }
+
+  const OpacityScene& wall_;
+  float resolution_;
+};
+
+/// The boundary of the wall's voxels with its vertices on the wall. Faces of no area are left out, and the back where
+/// it lies on the front: sheets without thickness stay single.
+class Shell {
+ public:
+  Shell(const Surface& wall, const VoxelLattice& lattice) {
+    const Boundary boundary(mark_voxels(wall, lattice));
+    const NearestPoint nearest(wall, lattice);
+    std::vector<dvec3> on_wall(boundary.corners.size());
+    parallel_for(on_wall.size(), 256, [&](size_t begin, size_t end) {
+      for (size_t v = begin; v < end; ++v) on_wall[v] = nearest.to(boundary.corners[v]);
+    });
+    surface.origin = wall.origin;
+    std::vector<uint32_t> vertex_of;
+    for (const dvec3& p : on_wall) vertex_of.push_back(vertex_at(p, lattice));
+    for (const uvec3& t : boundary.triangles) {
+      add_face({vertex_of[t.x], vertex_of[t.y], vertex_of[t.z]}, dvec3(boundary.corners[t.y] - boundary.corners[t.x]),
+               dvec3(boundary.corners[t.z] - boundary.corners[t.x]));
+    }
+  }
+
+  Surface surface;             ///< without materials
+  std::vector<vec3> outwards;  ///< unit, per face
+
+ private:
+  /// Vertices closer than this part of a voxel are one. The odd shift keeps rounding from telling apart what lies in a
+  /// plane of the lattice.
+  static constexpr double kSame = 1e-3, kShift = 0.37;
+
+  uint32_t vertex_at(const dvec3& in_voxels, const VoxelLattice& lattice) {
+    const glm::i64vec3 cell(glm::floor(in_voxels / kSame + kShift));
+    const auto number = static_cast<uint32_t>(surface.positions.size());
+    const auto [place, is_new] = vertex_of_.try_emplace(std::array<int64_t, 3>{cell.x, cell.y, cell.z}, number);
+    if (is_new) surface.positions.emplace_back(lattice.origin + in_voxels * lattice.voxel_size);
+    return place->second;
+  }
+
+  void add_face(const uvec3& t, const dvec3& edge1, const dvec3& edge2) {
+    std::array<uint32_t, 3> key = {t.x, t.y, t.z};
+    std::ranges::sort(key);
+    if (key[0] == key[1] || key[1] == key[2] || !faces_.insert(key).second) return;
+    surface.triangles.push_back(t);
+    const dvec3 before = glm::cross(edge1, edge2),
+                normal = area_vector_of(corners_of(surface, surface.triangles.size() - 1));
+    outwards.emplace_back(glm::normalize(glm::dot(normal, before) > 0 ? normal : before));
+  }
+
+  std::map<std::array<int64_t, 3>, uint32_t> vertex_of_;
+  std::set<std::array<uint32_t, 3>> faces_;
+};
+
+}  // namespace
+
+Result<Surface> wrap_wall(const Surface& wall, double resolution) {
+  const Shell shell(wall, {dvec3(wall.bounds().lower), kCell * resolution});
+  const Surface pieces = in_pieces(wall, resolution);
+  FARFIELD_TRY_LET(const auto scene, OpacityScene::build(pieces));
+  const WallViewer viewer(scene, resolution);
+  std::vector<Seen> seen(shell.surface.triangles.size());
+  parallel_for(seen.size(), 256, [&](size_t begin, size_t end) {
+    for (size_t f = begin; f < end; ++f) {
+      seen[f] = viewer.look_at(corners_of(shell.surface, f), shell.outwards[f], mix64(f));
+    }
+  });
+
+  Seen all;
+  all.sum = no_material();
+  for (const Seen& s : seen) {
+    all.sum = mix(all.sum, 1, s.sum, 1);
+    all.rays += s.rays, all.hits += s.hits, all.escaped += s.escaped;
+  }
+  if (!(all.hits > 0)) return Surface{};
+  const bool is_tight = all.hits > (1 - kLeastGap) * all.rays;
+  Surface result = shell.surface;
+  for (size_t f = 0; f < seen.size(); ++f) {
+    const Seen& own = seen[f].hits > 0 ? seen[f] : all;
+    FaceMaterial m = mean_of(own, all.escaped / all.hits);
+    if (is_tight) {
+      turn_normals_to(shell.outwards[f], m);
+    } else {
+      m.gap = 1 - seen[f].hits / seen[f].rays;
+    }
+    result.materials.push_back(m);
+  }
+  return result;
+}
+
+}  // namespace farfield

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Walls made of pieces: planks, tiles, shingles, whose gaps are small against a resolution (docs/decisions/0014).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "base/result.h"
+#include "prefilter/surface.h"
+
+namespace farfield {
+
+/// Per face: 1 where it is part of a wall at `resolution` (scene units, > 0).
+///
+/// A place is wall if all geometry within about 1.5 resolutions of it lies in a layer that is thin against the
+/// resolution, covers most of a disc there when looked at along the layer's normal, mostly with faces that lie in the
+/// layer's plane, and lets no light through. So foliage is none: its leaves lie at all angles, or leave holes. Faces of
+/// whose area most lies close to such places are of the wall.
+///
+/// Deterministic for any thread count. Errors: those of OpacityScene::build().
+Result<std::vector<uint8_t>> find_walls(const Surface& geometry, double resolution);
+
+/// Per face of `geometry`: 1 where most of its area is within about `distance` (> 0) of faces of `surface` that are
+/// marked in `is_marked`. Deterministic for any thread count.
+std::vector<uint8_t> find_near(const Surface& geometry, const Surface& surface, const std::vector<uint8_t>& is_marked,
+                               double distance);
+
+}  // namespace farfield
