@@ -22,7 +22,7 @@ std::vector<dvec3> spread_points(const Surface& geometry) {
   double area = 0;
   for (size_t f = 0; f < geometry.triangles.size(); ++f) {
     const dvec3 across = glm::cross(corner(f, 1) - corner(f, 0), corner(f, 2) - corner(f, 0));
-    area += glm::length(across) * static_cast<double>(geometry.materials[f].opacity);
+    area += glm::length(across) * static_cast<double>(geometry.materials[f].stopped_share());
     area_until.push_back(area);
   }
   std::vector<dvec3> points;

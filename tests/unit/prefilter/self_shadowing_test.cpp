@@ -78,9 +78,9 @@ TEST(SelfShadowing, OfLeavesAtRandomIsOnlyNoise) {
 // Where the viewer's way to a leaf is free, so is that of light from there; the wider leaves are, the more it counts.
 TEST(HotSpot, OfLeavesIsSeenAndGrowsWithThem) {
   LeafCloud cloud;
-  cloud.count = 20000, cloud.leaf_size = 0.012f;
+  cloud.count = 80000, cloud.leaf_size = 0.006f;
   const float small = voxelized(leaf_cloud(cloud), 1.0 / 8).hot_spot;
-  cloud.count = 800, cloud.leaf_size = 0.06f;
+  cloud.count = 3200, cloud.leaf_size = 0.03f;  // the same area; small against a voxel, or densities tell leaves apart
   const float large = voxelized(leaf_cloud(cloud), 1.0 / 8).hot_spot;
   EXPECT_GT(small, 0.0f);
   EXPECT_GT(large, small);
