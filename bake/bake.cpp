@@ -30,6 +30,7 @@
 #include "cache/level_file.h"
 #include "prefilter/face_materials.h"
 #include "prefilter/macrosurface.h"
+#include "prefilter/place_lattice.h"
 #include "prefilter/resolve.h"
 #include "prefilter/simplify.h"
 #include "prefilter/voxelize.h"
@@ -229,7 +230,7 @@ class Baker {
     const double finest_resolution = longest_side / options_.finest_grid;
     report_.manifest.origin = source_.origin;
     report_.manifest.base_resolution = finest_resolution / 2;
-    lattice_origin_ = 0.5 * (dvec3(bounds.lower) + dvec3(bounds.upper));
+    middle_ = 0.5 * (dvec3(bounds.lower) + dvec3(bounds.upper));
     last_level_ =
         options_.source_only ? 0 : static_cast<uint32_t>(std::bit_width(options_.finest_grid / options_.coarsest_grid));
 
@@ -419,7 +420,7 @@ class Baker {
     const Stopwatch watch;
     const VolumeJob job{sub_resolution_,
                         surface_,
-                        {lattice_origin_, resolution},
+                        place_lattice(sub_resolution_, middle_, resolution),
                         {.rays_per_voxel = options_.rays_per_voxel,
                          .seed = level,
                          .job = options_.job.step(stage, share_done(level, 0.05), share_done(level, 0.97))}};
@@ -529,7 +530,7 @@ class Baker {
   std::vector<uint8_t> is_shell_;  ///< faces of surface_ that are such walls
   MorphMaps from_stored_;          ///< from the last written level to surface_
   SlabHull hull_;
-  dvec3 lattice_origin_{0.0};
+  dvec3 middle_{0.0};  ///< of the source's bounds
   uint32_t last_level_ = 0;
 };
 

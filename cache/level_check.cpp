@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "cache/level_format.h"
+#include "scattering/hot_spot.h"
 
 namespace farfield {
 
@@ -28,6 +29,8 @@ Problem check_header(const LevelView& level) {
     return "the bounds are empty or not finite";
   }
   if (!is_finite(header.volume_origin)) return "the volume's origin is not finite";
+  if (!(header.hot_spot >= 0 && header.hot_spot <= kStrongestHotSpot))
+    return fmt::format("the hot spot's strength is {}", header.hot_spot);
   if (!level.has_surface() && !level.has_volume()) return "it has neither surface nor volume";
   return {};
 }

@@ -36,6 +36,15 @@ uint64_t hash_head(FileHeader header, Bytes table) {
 void copy_to(std::array<float, 3>& stored, const vec3& v) { stored = {v.x, v.y, v.z}; }
 vec3 to_vec3(const std::array<float, 3>& stored) { return {stored[0], stored[1], stored[2]}; }
 
+/// The first version that has what a level needs, so that older readers read what they can.
+uint32_t version_of(const LevelHeader& level, std::span<const SectionEntry> table) {
+  constexpr uint32_t kLastOfVersion1 = 18, kLastOfVersion2 = 27;
+  const uint32_t last = table.empty() ? 0 : table.back().id;
+  if (last > kLastOfVersion2) return kLevelFileVersion;
+  if (level.hot_spot != 0) return 3;
+  return last > kLastOfVersion1 ? 2 : 1;
+}
+
 LevelHeader to_level_header(const FileHeader& header) {
   LevelHeader level;
   level.level = header.level;
@@ -44,6 +53,7 @@ LevelHeader to_level_header(const FileHeader& header) {
   level.bounds.upper = to_vec3(header.bounds_upper);
   level.brick_dims = {header.brick_dims[0], header.brick_dims[1], header.brick_dims[2]};
   level.volume_origin = to_vec3(header.volume_origin);
+  level.hot_spot = header.hot_spot;
   return level;
 }
 
@@ -218,17 +228,6 @@ LevelLayout layout_of(const LevelView& level) {
   return layout;
 }
 
-namespace {
-
-/// The first version that had this section: so that older readers read what they can.
-uint32_t version_with(uint32_t last_section) {
-  constexpr uint32_t kLastOfVersion1 = 18, kLastOfVersion2 = 27;
-  if (last_section <= kLastOfVersion1) return 1;
-  return last_section <= kLastOfVersion2 ? 2 : kLevelFileVersion;
-}
-
-}  // namespace
-
 std::vector<std::byte> encode_head(const LevelView& level, const LevelLayout& layout) {
   std::vector<SectionEntry> table = layout.sections;
   size_t next = 0;
@@ -238,7 +237,7 @@ std::vector<std::byte> encode_head(const LevelView& level, const LevelLayout& la
 
   FileHeader header{};
   header.magic = kLevelFileMagic;
-  header.version = version_with(table.empty() ? 0 : table.back().id);
+  header.version = version_of(level.header, table);
   header.section_count = static_cast<uint32_t>(table.size());
   header.file_bytes = layout.file_bytes;
   header.level = level.header.level;
@@ -247,6 +246,7 @@ std::vector<std::byte> encode_head(const LevelView& level, const LevelLayout& la
   copy_to(header.bounds_upper, level.header.bounds.upper);
   header.brick_dims = {level.header.brick_dims.x, level.header.brick_dims.y, level.header.brick_dims.z};
   copy_to(header.volume_origin, level.header.volume_origin);
+  header.hot_spot = level.header.hot_spot;
   header.head_hash = hash_head(header, std::as_bytes(std::span(table)));
 
   std::vector<std::byte> head(head_bytes(table.size()));

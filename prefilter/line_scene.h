@@ -78,15 +78,18 @@ struct LinePass {
 Result<void> for_lines(const LineScene& scene, const LinePass& pass,
                        const std::function<void(const SeenLine&, SplitMix&)>& body);
 
+/// sigma_t of a voxel along a unit direction, in 1 / scene unit.
+inline double sigma_of(const Voxel& voxel, const vec3& direction) {
+  return static_cast<double>(voxel.density) * std::sqrt(std::max(0.0f, voxel.sggx.quadratic(direction)));
+}
+
 /// Calls visit(number of the voxel, optical depth there) along a ray through a volume with this grid.
 template <typename Visit>
 void visit_depths(const SparseVolume& volume, const VoxelGrid& grid, const VoxelRay& ray, Visit&& visit) {
   const vec3 direction(ray.direction);
   const double size = volume.lattice.voxel_size;
   grid.walk(ray, [&](uint32_t number, double enter, double leave) {
-    const Voxel& voxel = volume.voxels[number];
-    const double sigma = std::sqrt(std::max(0.0f, voxel.sggx.quadratic(direction)));
-    visit(number, (leave - enter) * size * static_cast<double>(voxel.density) * sigma);
+    visit(number, (leave - enter) * size * sigma_of(volume.voxels[number], direction));
     return true;
   });
 }

@@ -9,49 +9,176 @@
 
 #include "prefilter/voxel_ratios.h"
 #include "scattering/albedo.h"
+#include "scattering/hot_spot.h"
+#include "scattering/sggx.h"
 #include "scattering/warp.h"
 
 namespace farfield {
 namespace {
 
-/// In voxels: how far light must get away.
-constexpr double kEscapeLength = 0.5;
 /// In voxels: light that goes on starts this far from the face it leaves.
 constexpr float kClearance = 1e-3f;
+constexpr float kFar = std::numeric_limits<float>::infinity();
 /// What the measurement of a brick counts in each of its voxels, as light of weight 1 that is sent on.
-constexpr double kPriorLight = 4;
+constexpr double kPriorLight = 64;
 
-/// Where light goes on that arrived along `direction` at a face: a cosine lobe on the side that it came from or, as
-/// often as the face lets light through, on the other. Nothing for faces too small to have a normal.
-std::optional<vec3> scattered_direction(const FaceMaterial& m, const vec3& geometric_normal, const vec3& direction,
-                                        SplitMix& random) {
-  const float longest = max_component(glm::abs(geometric_normal));
-  if (!(longest >= std::numeric_limits<float>::min())) return {};
+/// Light that goes on from what a line sees first.
+struct SentOn {
+  vec3 direction{0.0f};
+  float contrast = 0;  ///< L less its mean over the lobe: what the strength of the hot spot multiplies
+  float weight = 0;    ///< how much light
+};
+
+/// Where light goes on that arrived along `direction`: a cosine lobe on the side that it came from or, as often as
+/// light goes through, on the other. Material: FaceMaterial or Voxel. Nothing for black ones.
+template <typename Material>
+std::optional<SentOn> scattered(const Material& m, const vec3& normal, const vec3& direction, SplitMix& random) {
+  const float weight = component_sum(layered_albedo(m.specular, m.diffuse + m.transmission));
+  if (!(weight > 0)) return {};
   const float through = component_sum(m.transmission);
   const float back = component_sum(m.diffuse) + component_sum(m.specular);
   const bool goes_through = static_cast<float>(random.next_unit()) * (through + back) < through;
-  // In two steps: the square of a tiny face's normal may be no float.
-  const vec3 normal = glm::normalize(geometric_normal / longest);
+  const vec3 side = (glm::dot(normal, direction) > 0) == goes_through ? normal : -normal;
   const auto u1 = to_unit_float(random.next()), u2 = to_unit_float(random.next());
-  return cosine_lobe((glm::dot(normal, direction) > 0) == goes_through ? normal : -normal, u1, u2);
+  const vec3 away = cosine_lobe(side, u1, u2);
+  const float contrast = hot_spot_lobe(-glm::dot(direction, away)) - mean_hot_spot_lobe(-glm::dot(direction, side));
+  return SentOn{away, contrast, weight};
 }
 
-/// The light of one hit.
-struct SentOn {
-  vec3 direction{0.0f};
-  float weight = 0;
-  bool gets_away = false;
+/// From the hit. Nothing for faces too small to have a normal.
+std::optional<SentOn> scattered_by_source(const LineScene& scene, const SeenLine& line, SplitMix& random) {
+  const float longest = max_component(glm::abs(line.hit->normal));
+  if (!(longest >= std::numeric_limits<float>::min())) return {};
+  // In two steps: the square of a tiny face's normal may be no float.
+  const vec3 normal = glm::normalize(line.hit->normal / longest);
+  return scattered(scene.geometry().materials[line.hit->triangle], normal, line.direction, random);
+}
+
+std::optional<SentOn> scattered_by_medium(const Voxel& voxel, const SeenLine& line, SplitMix& random) {
+  const auto u1 = to_unit_float(random.next()), u2 = to_unit_float(random.next());
+  const vec3 normal = Sggx(cholesky(voxel.sggx)).sample_visible(-line.direction, u1, u2);
+  return scattered(voxel, normal, line.direction, random);
+}
+
+/// Where the medium stops a line first.
+struct Collision {
+  uint32_t voxel = 0;
+  double at = 0;  ///< along the line's ray, in voxels
+};
+std::optional<Collision> first_collision(const SparseVolume& volume, const LineScene& scene, const SeenLine& line,
+                                         SplitMix& random) {
+  double left = -std::log1p(-random.next_unit());
+  std::optional<Collision> found;
+  const vec3 direction(line.ray.direction);
+  scene.grid().walk(line.ray, [&](uint32_t number, double enter, double leave) {
+    const double rate = volume.lattice.voxel_size * sigma_of(volume.voxels[number], direction);
+    const double depth = rate * (leave - enter);
+    if (depth > left) found = {number, enter + left / rate};
+    left -= depth;
+    return !found;
+  });
+  return found;
+}
+
+/// How much of the light that something sends on gets away.
+struct Escape {
+  FixedSum sent, away;
+  FixedSum away_contrast;  ///< weighted with the contrast
 };
 
-std::optional<SentOn> send_on(const LineScene& scene, const SeenLine& line, SplitMix& random) {
-  const FaceMaterial& m = scene.geometry().materials[line.hit->triangle];
-  const auto away = scattered_direction(m, line.hit->normal, line.direction, random);
-  const float weight = component_sum(layered_albedo(m.specular, m.diffuse + m.transmission));
-  if (!away || !(weight > 0)) return {};
-  const auto size = static_cast<float>(scene.lattice().voxel_size);
-  const float near = kClearance * size, far = static_cast<float>(kEscapeLength) * size;
-  if (scene.is_stopped_by_macrosurface(line.point(), *away, near, far, random)) return {};  // as it stops the medium's
-  return SentOn{*away, weight, !scene.is_stopped_by_geometry(line.point(), *away, near, far, random)};
+/// Light of one of two kinds: of the geometry, of the medium. Any thread may add.
+struct Light {
+  explicit Light(size_t voxels) : of_voxel(voxels) {}
+
+  void add(uint32_t voxel, const SentOn& sent, double share_away) {
+    const double away = share_away * sent.weight;
+    of_voxel[voxel].sent.add(sent.weight);
+    of_voxel[voxel].away.add(away);
+    of_voxel[voxel].away_contrast.add(away * sent.contrast);
+    contrast2.add(away * sent.contrast * sent.contrast);
+  }
+
+  std::vector<Escape> of_voxel;
+  FixedSum contrast2;
+};
+
+class EscapeMeasurement {
+ public:
+  EscapeMeasurement(const LineScene& scene, const SparseVolume& volume)
+      : scene_(scene), volume_(volume), source_(volume.voxels.size()), medium_(volume.voxels.size()) {}
+
+  void add(const SeenLine& line, SplitMix& random) {
+    if (line.hit) add_source(line, random);
+    add_medium(line, random);
+  }
+
+  float hot_spot_strength() const;
+  std::vector<double> ratios(float strength) const;
+
+ private:
+  void add_source(const SeenLine& line, SplitMix& random);
+  void add_medium(const SeenLine& line, SplitMix& random);
+  /// What the macrosurface stops it stops for both: it says nothing.
+  bool meets_macrosurface(const vec3& from, const SentOn& sent, SplitMix& random) const {
+    return scene_.is_stopped_by_macrosurface(from, sent.direction, near(), kFar, random);
+  }
+  float near() const { return kClearance * static_cast<float>(scene_.lattice().voxel_size); }
+
+  const LineScene& scene_;
+  const SparseVolume& volume_;
+  Light source_, medium_;
+};
+
+void EscapeMeasurement::add_source(const SeenLine& line, SplitMix& random) {
+  const auto voxel = scene_.voxel_of_hit(line);
+  const auto sent = scattered_by_source(scene_, line, random);
+  if (!voxel || !sent || meets_macrosurface(line.point(), *sent, random)) return;
+  const bool is_stopped = scene_.is_stopped_by_geometry(line.point(), sent->direction, near(), kFar, random);
+  source_.add(*voxel, *sent, is_stopped ? 0 : 1);
+}
+
+void EscapeMeasurement::add_medium(const SeenLine& line, SplitMix& random) {
+  const auto collision = first_collision(volume_, scene_, line, random);
+  if (!collision) return;
+  const auto sent = scattered_by_medium(volume_.voxels[collision->voxel], line, random);
+  const dvec3 at = line.ray.origin + collision->at * line.ray.direction;
+  const vec3 from(volume_.lattice.origin + volume_.lattice.voxel_size * at);
+  if (!sent || meets_macrosurface(from, *sent, random)) return;
+  const VoxelRay away{at, dvec3(sent->direction), 0, kFar};
+  medium_.add(collision->voxel, *sent, std::exp(-optical_depth(volume_, scene_.grid(), away)));
+}
+
+/// Mean contrast of the light that gets away must be the geometry's.
+float EscapeMeasurement::hot_spot_strength() const {
+  const auto total = [](const Light& light, FixedSum Escape::*field) {
+    double sum = 0;
+    for (const Escape& of_voxel : light.of_voxel) sum += (of_voxel.*field).value();
+    return sum;
+  };
+  const double source = total(source_, &Escape::away), medium = total(medium_, &Escape::away);
+  if (!(source > 0 && medium > 0)) return 0;
+  const double wanted = total(source_, &Escape::away_contrast) / source;
+  const double first = total(medium_, &Escape::away_contrast), second = medium_.contrast2.value();
+  const double slope = second - wanted * first;
+  if (!(slope > 0)) return 0;
+  return static_cast<float>(std::clamp((wanted * medium - first) / slope, 0.0, double{kStrongestHotSpot}));
+}
+
+/// What gets away of the geometry's light by what gets away of the medium's with such a hot spot, voxel by voxel.
+std::vector<double> EscapeMeasurement::ratios(float strength) const {
+  const auto escapes = [&](const Light& light, double of_contrast) {
+    std::vector<SourceAndMedium> sums(light.of_voxel.size());
+    for (size_t v = 0; v < sums.size(); ++v) {
+      const Escape& of_voxel = light.of_voxel[v];
+      sums[v].source.add(of_voxel.away.value() + of_contrast * of_voxel.away_contrast.value());
+      sums[v].medium.add(of_voxel.sent.value());
+    }
+    return shrunk_ratios(volume_, sums, kPriorLight);
+  };
+  std::vector<double> result = escapes(source_, 0);
+  const std::vector<double> medium = escapes(medium_, strength);
+  for (size_t v = 0; v < result.size(); ++v) result[v] /= std::max(medium[v], 1e-6);
+  return result;
 }
 
 }  // namespace
@@ -69,20 +196,11 @@ void let_escape(double ratio, Voxel& voxel) {
 
 Result<void> measure_self_shadowing(const LineScene& scene, SparseVolume& volume, const SelfShadowingOptions& options) {
   if (volume.voxels.empty()) return {};
-  std::vector<SourceAndMedium> light(volume.voxels.size());
-  FARFIELD_TRY(
-      for_lines(scene, {options.lines, options.seed, options.job}, [&](const SeenLine& line, SplitMix& random) {
-        if (!line.hit) return;
-        const auto v = scene.voxel_of_hit(line);
-        if (!v) return;
-        const auto sent = send_on(scene, line, random);
-        if (!sent) return;
-        const VoxelRay away{(dvec3(line.point()) - volume.lattice.origin) / volume.lattice.voxel_size,
-                            dvec3(sent->direction), 0, kEscapeLength};
-        if (sent->gets_away) light[*v].source.add(sent->weight);
-        light[*v].medium.add(sent->weight * std::exp(-optical_depth(volume, scene.grid(), away)));
-      }));
-  const std::vector<double> ratios = shrunk_ratios(volume, light, kPriorLight);
+  EscapeMeasurement measurement(scene, volume);
+  FARFIELD_TRY(for_lines(scene, {options.lines, options.seed, options.job},
+                         [&](const SeenLine& line, SplitMix& random) { measurement.add(line, random); }));
+  volume.hot_spot = measurement.hot_spot_strength();
+  const std::vector<double> ratios = measurement.ratios(volume.hot_spot);
   for (size_t v = 0; v < ratios.size(); ++v) let_escape(ratios[v], volume.voxels[v]);
   return {};
 }

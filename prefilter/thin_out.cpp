@@ -59,6 +59,7 @@ double kept_share(const Voxel& voxel, double size) {
 SparseVolume thin_out(const SparseVolume& volume, uint64_t seed) {
   SparseVolume result;
   result.lattice = volume.lattice;
+  result.hot_spot = volume.hot_spot;
   for (VoxelBrick brick : volume.bricks) {
     uint64_t next = brick.first_voxel;
     brick.first_voxel = result.voxels.size();

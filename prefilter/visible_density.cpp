@@ -29,7 +29,7 @@ namespace {
 
 constexpr double kPriorHits = 2;   ///< hits that a voxel's own measurement counts as, against what lines see of it
 constexpr double kPriorMatch = 1;  ///< the same for matching, in units of sum d T A
-constexpr int kMatchPasses = 4;
+constexpr int kMatchPasses = 8;
 constexpr double kMostMatch = 1.5;  ///< a pass changes a density by no larger factor
 constexpr double kMostWhole = 2;
 

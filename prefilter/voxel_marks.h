@@ -13,8 +13,8 @@
 
 namespace farfield {
 
-/// Where voxels lie: voxel (i, j, k) covers origin + [i, i+1] x [j, j+1] x [k, k+1] * voxel_size. The lattices of all
-/// levels of an asset share the origin, so that 8 voxels of one level fill one voxel of the next.
+/// Where voxels lie: voxel (i, j, k) covers origin + [i, i+1] x [j, j+1] x [k, k+1] * voxel_size. Each level of an
+/// asset has an origin of its own (place_lattice.h): lattices are not nested.
 struct VoxelLattice {
   dvec3 origin{0.0};
   double voxel_size = 0;  ///< > 0, scene units

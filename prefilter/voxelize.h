@@ -40,6 +40,7 @@ struct SparseVolume {
   VoxelLattice lattice;
   std::vector<VoxelBrick> bricks;  ///< none empty; sorted by z, then y, then x
   std::vector<Voxel> voxels;
+  float hot_spot = 0;  ///< of all voxels (scattering/hot_spot.h). Not measured by voxelize()
 };
 
 /// Some of the bricks that may hold voxels, by their number in the order of SparseVolume::bricks. Ranges that follow

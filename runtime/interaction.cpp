@@ -112,6 +112,7 @@ FlakeParams flake_params(const LevelView& level, const InstanceRecord& instance,
   params.transmission = color_at(level.voxel_transmission, voxel);
   params.roughness2 = unorm_at(level.voxel_roughness2, voxel);
   params.self_shadowing = unorm_at(level.voxel_self_shadowing, voxel);
+  params.hot_spot = level.header.hot_spot;
   return params;
 }
 

@@ -4,7 +4,7 @@
 //
 // With A = self_shadowing, sigma(w) = sqrt(w^T S w), and m the flakes of sggx visible from wo:
 //
-//   A E_m[ f_m(wo, wi) |wi.m| ] + (1 - A) albedo_ms sigma(wi) / (4 pi R_G)
+//   A E_m[ f_m(wo, wi) |wi.m| ] + (1 - A) albedo_ms (1 + wo.wi) sigma(wi) / (4 pi R_G)
 //
 // f_m is the BRDF (and transmission) of a flat surface with normal m and the voxel's reflectance: a flake scatters as
 // the piece of surface that it stands for (docs/decisions/0007). With a = R + (1 - R)(diffuse + transmission), what a
@@ -12,8 +12,8 @@
 // light that meets another flake close by is coloured again. The thesis stores albedo_ms per voxel instead (14.1.16);
 // this needs no bytes and keeps white white.
 //
-// Reciprocal in the sense of anisotropic media, sigma(wo) f(wo, wi) = sigma(wi) f(wi, wo); the integral over wi is at
-// most 1, and 1 where diffuse + transmission = 1.
+// Reciprocal in the sense of anisotropic media, sigma(wo) f(wo, wi) = sigma(wi) f(wi, wo), but for the hot spot's
+// factor (scattering/hot_spot.h); the integral over wi is at most 1, and 1 where diffuse + transmission = 1.
 #pragma once
 
 #include "base/random.h"
@@ -35,6 +35,7 @@ struct FlakeParams {
   vec3 transmission{0.0f};
   float roughness2 = 1.0f;
   float self_shadowing = 1.0f;  ///< A in (0, 1]; 1: none
+  float hot_spot = 0.0f;        ///< strength in [0, kStrongestHotSpot] (scattering/hot_spot.h); 0: none
 };
 
 /// A voxel's scattering seen from wo, given that a collision happened, with the given channels (scattering/channels.h);
@@ -51,7 +52,8 @@ class FlakeModel {
   /// scattering; the rest has no closed form. Weights made from it sum to one, so estimates stay unbiased as long as
   /// `weight` below is used.
   float pdf(const vec3& wi) const;
-  /// weight = albedo * phase / true density of the sample (albedo itself for white diffuse flakes); `pdf` = pdf(wi).
+  /// weight = albedo * phase / true density of the sample (for diffuse flakes without hot spot the albedo itself);
+  /// `pdf` = pdf(wi).
   ScatterSample sample(Rng& rng) const;
 
  private:
@@ -83,11 +85,13 @@ class FlakeModel {
   vec3 set_up_specular(const FlakeParams& params, const SymMat3& s) requires(kHasSpecular);
   void set_up_multiple(const FlakeParams& params, const SymMat3& s, const vec3& highlight) requires(kHasMultiple);
   float single_share() const;
+  float multiple_density(const vec3& wi) const requires(kHasMultiple);
   bool scatters_once() const { return chances_.specular + chances_.diffuse + chances_.transmission > 0; }
   Flake sample_flake(Rng& rng) const;
 
   CholeskyFactor<float> flakes_;
   vec3 wo_;
+  float hot_spot_ = 0;
   Chances chances_;
   [[no_unique_address]] PartIf<kHasDiffuse, vec3> diffuse_{};
   [[no_unique_address]] PartIf<kHasTransmission, vec3> transmission_{};

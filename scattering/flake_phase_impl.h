@@ -49,7 +49,7 @@ inline float diffuse_density(const CholeskyFactor<float>& b, const vec3& wo, con
 }  // namespace detail
 
 template <unsigned kChannels>
-FlakeModel<kChannels>::FlakeModel(const FlakeParams& params, const vec3& wo) : wo_(wo) {
+FlakeModel<kChannels>::FlakeModel(const FlakeParams& params, const vec3& wo) : wo_(wo), hot_spot_(params.hot_spot) {
   const SymMat3 s = detail::usable_sggx(params.sggx);
   flakes_ = cholesky(s);
   if constexpr (kHasDiffuse) diffuse_ = clamp_albedo(params.diffuse), chances_.diffuse = max_component(diffuse_);
@@ -113,7 +113,13 @@ typename FlakeModel<kChannels>::Flake FlakeModel<kChannels>::sample_flake(Rng& r
   if constexpr (kHasDiffuse) params.diffuse = diffuse_;
   if constexpr (kHasTransmission) params.transmission = transmission_;
   if constexpr (kHasSpecular) params.specular = specular_.f0, params.roughness2 = specular_.roughness2;
+  params.hot_spot = hot_spot_;
   return Flake(params, m, wo_);
+}
+
+template <unsigned kChannels>
+float FlakeModel<kChannels>::multiple_density(const vec3& wi) const requires(kHasMultiple) {
+  return multiple_.norm * Sggx(flakes_).sigma(wi) * (1.0f + glm::dot(wo_, wi));
 }
 
 template <unsigned kChannels>
@@ -121,7 +127,7 @@ vec3 FlakeModel<kChannels>::eval(const vec3& wi, [[maybe_unused]] Rng& rng) cons
   vec3 value(0.0f);
   if (scatters_once()) value = single_share() * sample_flake(rng).eval(wi);
   if constexpr (kHasMultiple) {
-    value += multiple_.share * multiple_.norm * Sggx(flakes_).sigma(wi) * multiple_.albedo;
+    value += multiple_.share * multiple_density(wi) * multiple_.albedo;
   }
   return value;
 }
@@ -138,7 +144,7 @@ float FlakeModel<kChannels>::pdf(const vec3& wi) const {
   if constexpr (kHasTransmission) {
     if (chances_.transmission > 0) density += chances_.transmission * detail::diffuse_density(flakes_, wo_, -wi);
   }
-  if constexpr (kHasMultiple) density += chances_.multiple * multiple_.norm * Sggx(flakes_).sigma(wi);
+  if constexpr (kHasMultiple) density += chances_.multiple * multiple_density(wi);
   return density;
 }
 
@@ -148,6 +154,8 @@ ScatterSample FlakeModel<kChannels>::sample(Rng& rng) const {
   if constexpr (kHasMultiple) {
     if (chances_.multiple > 0 && rng.next() < chances_.multiple) {
       result.wi = Sggx(flakes_).sample_sigma(rng);
+      // of wi and -wi, which are as likely, the one by 1 + wo.wi
+      if (2.0f * rng.next() >= 1.0f + glm::dot(wo_, result.wi)) result.wi = -result.wi;
       result.weight = multiple_.albedo;  // chosen with probability 1 - A, which is its share
       result.pdf = pdf(result.wi);
       return result;

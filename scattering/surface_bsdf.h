@@ -26,6 +26,7 @@ struct SurfaceParams {
   vec3 specular{0.0f};  ///< F0; Schlick's Fresnel; 0 means no highlight at all
   vec3 transmission{0.0f};
   float roughness2 = 1.0f;  ///< alpha^2
+  float hot_spot = 0.0f;    ///< of the base, in [0, kStrongestHotSpot]: for flakes (scattering/hot_spot.h)
 };
 
 /// A face seen from wo, with the given channels (scattering/channels.h); parameters of the others are not looked at.
@@ -59,6 +60,7 @@ class SurfaceModel {
 
   vec3 n_, wo_;
   float cos_o_;
+  float hot_spot_ = 0;
   float specular_chance_ = 0;  ///< how often sample() picks the lobe; all 0: black
   float diffuse_chance_ = 0;   ///< cosine lobes: the base's, and that of several facets
   float transmission_chance_ = 0;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "scattering/albedo.h"
+#include "scattering/hot_spot.h"
 #include "scattering/microfacet_brdf.h"
 #include "scattering/surface_bsdf.h"
 
@@ -11,7 +12,7 @@ namespace farfield {
 
 template <unsigned kChannels>
 SurfaceModel<kChannels>::SurfaceModel(const SurfaceParams& params, const vec3& n, const vec3& wo)
-    : n_(n), wo_(wo), cos_o_(glm::dot(n, wo)) {
+    : n_(n), wo_(wo), cos_o_(glm::dot(n, wo)), hot_spot_(params.hot_spot) {
   if (!(cos_o_ > 0)) return;
   if constexpr (kHasDiffuse) diffuse_ = clamp_albedo(params.diffuse), diffuse_chance_ = max_component(diffuse_);
   if constexpr (kHasTransmission) {
@@ -56,6 +57,7 @@ vec3 SurfaceModel<kChannels>::eval(const vec3& wi) const {
   if constexpr (kHasTransmission) {
     if (cos_i < 0) base = transmission_;
   }
+  if (hot_spot_ > 0) base *= hot_spot(hot_spot_, glm::dot(wo_, wi), cos_i > 0 ? cos_o_ : -cos_o_);
   if constexpr (kHasSpecular) {
     if (specular_.highlight.exists()) {
       const HighlightShare share = specular_.highlight.share(std::abs(cos_i));

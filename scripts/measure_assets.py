@@ -4,9 +4,7 @@
 import json
 import sys
 
-# Thesis, figures 10.1 to 10.3: occlusion error in % at 512^3 ... 16^3 of its willow, vessel and maple.
-THESIS = {512: (0.90, 1.3, -2.4), 256: (1.7, 0.94, -1.35), 128: (2.1, 2.8, 0.75), 64: (2.8, 0.63, 2.86),
-          32: (4.4, 1.3, 5.11), 16: (8.3, 7.3, 7.97)}
+from thesis_figures import occlusion_text
 
 
 def percent(x, digits=2):
@@ -33,12 +31,11 @@ def table(folder, name):
           "| thesis: willow, vessel, maple |")
     print("|---" * 10 + "|")
     for level in evaluated["levels"]:
-        thesis = THESIS.get(level["grid"])
         print("| %d | %d | %d | %.0f | %.0f | %s | %s | %s | %s | %s |" % (
             level["grid"], level["triangles"], level["voxels"], level["bytes_disk"] / 1024,
             level["bytes_resident"] / 1024, percent(level["occlusion_error"]), size(level, "occlusion_rms"),
             size(level, "color_error"), bias(level),
-            ", ".join("%+.2f" % t for t in thesis) if thesis else "-"))
+            occlusion_text(level["grid"])))
     print("\n| grid | light | bias r, g, b | worst view, bias r, g, b | colour error | rms | 2x2 | 4x4 |\n" + "|---" * 8 + "|")
     for level in evaluated["levels"]:
         for light in level["lights"]:

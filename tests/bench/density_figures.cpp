@@ -8,6 +8,8 @@
 // * lines: share of isotropic lines through the bounds that are stopped, level against source;
 // * views: the same over the pictures of `farfield evaluate` (12 views, one pixel per voxel), the rms over all pixels,
 //   and the worst view;
+// * any: the same over 32 views in no plane of the lattice, whose pixels lie anywhere: the rms over touched pixels, and
+//   how many more pixels the level touches than its source;
 // * inside: the same for rays in all directions from free points near the geometry, as shadow rays and bounces are;
 // * depth: half the sum of |difference| of the distribution of their first-hit distances, in bins of a voxel.
 #include <fmt/format.h>
@@ -125,43 +127,85 @@ void compare_lines(const Comparison& c, const Box3& bounds, size_t count) {
   fmt::print("  lines {:+6.2f} %", total.error());
 }
 
+/// How much of each pixel of a picture is covered, by the source and by the level.
+struct Coverage {
+  std::vector<double> source, level;
+  int samples = 0;  ///< per pixel
+
+  size_t size() const { return source.size(); }
+  /// Without what noise of the source adds.
+  double squared_error(size_t p) const {
+    return (level[p] - source[p]) * (level[p] - source[p]) - source[p] * (1 - source[p]) / (samples - 1);
+  }
+};
+
+/// `shift`: of the picture's upper left corner, in pixels.
+Coverage cover(const Comparison& c, const OrthoView& view, const glm::dvec2& shift, double samples, uint64_t seed) {
+  const auto count = static_cast<size_t>(view.width_px * view.height_px);
+  Coverage result{std::vector<double>(count), std::vector<double>(count)};
+  result.samples = static_cast<int>(std::clamp<double>(samples / static_cast<double>(count), 4, 1024));
+  const float back = view.width() + view.pixel_size * static_cast<float>(view.height_px);  // more than a diagonal
+  const glm::dvec2 corner = shift - 0.5 * glm::dvec2(view.width_px, view.height_px);
+  parallel_for(count, 64, [&](size_t begin, size_t end) {
+    for (size_t p = begin; p < end; ++p) {
+      SplitMix random(mix64(seed, p));
+      const glm::dvec2 pixel =
+          corner + glm::dvec2(p % static_cast<size_t>(view.width_px), p / static_cast<size_t>(view.width_px));
+      for (int s = 0; s < result.samples; ++s) {
+        const double x = pixel.x + random.next_unit(), y = pixel.y + random.next_unit();
+        const vec3 origin = view.center +
+                            view.pixel_size * (static_cast<float>(x) * view.right() - static_cast<float>(y) * view.up) -
+                            back * view.direction;
+        result.source[p] += c.source.first_stop(origin, view.direction, 2 * back, random) ? 1 : 0;
+        result.level[p] += c.opacity(origin, view.direction, 2 * back, random);
+      }
+      result.source[p] /= result.samples, result.level[p] /= result.samples;
+    }
+  });
+  return result;
+}
+
 void compare_views(const Comparison& c, const Box3& bounds, float resolution) {
+  constexpr int kViews = 12;
   Total total;
   double squares = 0, pixels = 0, worst = 0;
-  std::vector<double> errors;
-  for (const vec3& direction : view_directions(12)) {
+  for (const vec3& direction : view_directions(kViews)) {
     const OrthoView view = frame_view(bounds, direction, resolution);
-    const auto count = static_cast<size_t>(view.width_px * view.height_px);
-    const int spp = static_cast<int>(std::clamp<double>(3e6 / 12 / static_cast<double>(count), 4, 1024));
+    const Coverage cover_of = cover(c, view, glm::dvec2(0), 3e6 / kViews, mix64(static_cast<uint64_t>(pixels)));
     Total of_view;
-    std::vector<double> square(count);
-    const float back = glm::length(bounds.size());
-    parallel_for(count, 64, [&](size_t begin, size_t end) {
-      for (size_t p = begin; p < end; ++p) {
-        SplitMix random(mix64(mix64(static_cast<uint64_t>(pixels)), p));
-        double source = 0, level = 0;
-        for (int s = 0; s < spp; ++s) {
-          const double x =
-              static_cast<double>(p % static_cast<size_t>(view.width_px)) + random.next_unit() - 0.5 * view.width_px;
-          const double y =
-              static_cast<double>(p / static_cast<size_t>(view.width_px)) + random.next_unit() - 0.5 * view.height_px;
-          const vec3 origin = view.center +
-                              resolution * (static_cast<float>(x) * view.right() - static_cast<float>(y) * view.up) -
-                              back * view.direction;
-          source += c.source.first_stop(origin, view.direction, 2 * back, random) ? 1 : 0;
-          level += c.opacity(origin, view.direction, 2 * back, random);
-        }
-        source /= spp, level /= spp;
-        of_view.add(source, level), total.add(source, level);
-        square[p] = (level - source) * (level - source) - source * (1 - source) / (spp - 1);
-      }
-    });
-    for (const double s : square) squares += s;
-    pixels += static_cast<double>(count);
+    for (size_t p = 0; p < cover_of.size(); ++p) {
+      of_view.add(cover_of.source[p], cover_of.level[p]), total.add(cover_of.source[p], cover_of.level[p]);
+      squares += cover_of.squared_error(p);
+    }
+    pixels += static_cast<double>(cover_of.size());
     worst = std::abs(of_view.error()) > std::abs(worst) ? of_view.error() : worst;
   }
   fmt::print("  views {:+6.2f} % rms {:5.2f} % worst {:+6.2f} %", total.error(),
              100 * std::sqrt(std::max(0.0, squares / pixels)), worst);
+}
+
+/// Over views that lie in no plane of the lattice, whose pixels lie anywhere: also how many pixels are touched.
+void compare_any_views(const Comparison& c, const Box3& bounds, float resolution) {
+  constexpr int kViews = 32;
+  constexpr double kSeen = 1.0 / 256;  // less is not seen
+  Total total;
+  double squares = 0, source_touched = 0, level_touched = 0, touched = 0;
+  uint64_t seed = 79;
+  for (const vec3& direction : view_directions(kViews)) {
+    SplitMix random(++seed);
+    OrthoView view = frame_view(bounds, direction, resolution);
+    ++view.width_px, ++view.height_px;  // contains the bounds wherever it is shifted
+    const glm::dvec2 shift(random.next_unit() - 0.5, random.next_unit() - 0.5);
+    const Coverage cover_of = cover(c, view, shift, 1e7 / kViews, seed);
+    for (size_t p = 0; p < cover_of.size(); ++p) {
+      const bool by_source = cover_of.source[p] > kSeen, by_level = cover_of.level[p] > kSeen;
+      total.add(cover_of.source[p], cover_of.level[p]);
+      squares += cover_of.squared_error(p);
+      source_touched += by_source, level_touched += by_level, touched += by_source || by_level;
+    }
+  }
+  fmt::print("  any {:+6.2f} % rms of touched {:5.2f} % touches {:+5.1f} %", total.error(),
+             100 * std::sqrt(std::max(0.0, squares / touched)), 100 * (level_touched / source_touched - 1));
 }
 
 /// From points where the source's first hits are seen to come from: a little in front of them, on both sides.
@@ -232,8 +276,9 @@ Result<void> run(const char* source_file, const char* folder, const std::set<uin
     fmt::print("{:4}^3 {:7} triangles {:7} voxels", entry.grid, entry.triangles, entry.voxels);
     compare_lines(comparison, bounds, 2'000'000);
     compare_views(comparison, bounds, static_cast<float>(entry.resolution));
+    compare_any_views(comparison, bounds, static_cast<float>(entry.resolution));
     compare_inside(comparison, bounds, entry.resolution, 1'000'000);
-    fmt::print("\n");
+    fmt::print("  {:.1f} KiB\n", static_cast<double>(entry.resident_bytes) / 1024);
     std::fflush(stdout);
   }
   return {};

@@ -239,7 +239,14 @@ LevelData full_level_of_version_2() {
 }
 
 LevelData full_level_of_version_3() {
+  LevelData level = full_level();
+  level.header.hot_spot = 0.15f;
+  return level;
+}
+
+LevelData full_level_of_version_4() {
   LevelData level = full_level_of_version_2();
+  level.header.hot_spot = 0.15f;
   level.face_gap = counted<uint8_t>(3, 17);
   return level;
 }
@@ -299,6 +306,7 @@ LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks) {
       level.morph_face.push_back(i % 5 == 0 ? kMorphCollapsed : rng.next_uint() % face);
     }
   }
+  if (bricks > 0 && has()) level.header.hot_spot = 0.5f * rng.next();
   return level;
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "prefilter/measure_volume.h"
+#include "scattering/hot_spot.h"
 #include "tests/support/surfaces.h"
 
 namespace farfield {
@@ -72,6 +73,18 @@ TEST(SelfShadowing, OfLeavesAtRandomIsOnlyNoise) {
   const Means mean = means_of(voxelized(leaf_cloud(cloud), 1.0 / 8));
   EXPECT_NEAR(mean.self_shadowing, 1, 0.03);
   EXPECT_NEAR(mean.diffuse, 0.5, 0.02);
+}
+
+// Where the viewer's way to a leaf is free, so is that of light from there; the wider leaves are, the more it counts.
+TEST(HotSpot, OfLeavesIsSeenAndGrowsWithThem) {
+  LeafCloud cloud;
+  cloud.count = 20000, cloud.leaf_size = 0.012f;
+  const float small = voxelized(leaf_cloud(cloud), 1.0 / 8).hot_spot;
+  cloud.count = 800, cloud.leaf_size = 0.06f;
+  const float large = voxelized(leaf_cloud(cloud), 1.0 / 8).hot_spot;
+  EXPECT_GT(small, 0.0f);
+  EXPECT_GT(large, small);
+  EXPECT_LT(large, kStrongestHotSpot);
 }
 
 // The same leaves in tufts, each much smaller than a voxel: most of the light meets another leaf of the same tuft.

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Positions along an axis, modulo a voxel, lie on a circle; their mean on it is where most of the geometry is, and
+// becomes the middle of voxels. What is spread over many voxels adds nothing to it, so that a trunk decides for its
+// crown.
+#include "prefilter/place_lattice.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "prefilter/isotropic_lines.h"
+
+namespace farfield {
+namespace {
+
+constexpr uint64_t kPoints = 16384;  ///< leave 1 % of a voxel's circle to chance
+
+/// Points spread evenly over what stops rays. None if there is no area.
+std::vector<dvec3> spread_points(const Surface& geometry) {
+  const auto corner = [&](size_t face, int c) { return dvec3(geometry.positions[geometry.triangles[face][c]]); };
+  std::vector<double> area_until;
+  double area = 0;
+  for (size_t f = 0; f < geometry.triangles.size(); ++f) {
+    const dvec3 across = glm::cross(corner(f, 1) - corner(f, 0), corner(f, 2) - corner(f, 0));
+    area += glm::length(across) * static_cast<double>(geometry.materials[f].opacity);
+    area_until.push_back(area);
+  }
+  std::vector<dvec3> points;
+  if (!(area > 0)) return points;
+  points.reserve(kPoints);
+  for (uint64_t i = 0; i < kPoints; ++i) {
+    const auto u = even_coordinates(i, 0);
+    const auto found = std::upper_bound(area_until.begin(), area_until.end() - 1, u[0] * area);
+    const auto face = static_cast<size_t>(found - area_until.begin());
+    const double root = std::sqrt(u[1]);
+    points.push_back((1 - root) * corner(face, 0) + root * (1 - u[2]) * corner(face, 1) +
+                     root * u[2] * corner(face, 2));
+  }
+  return points;
+}
+
+/// Where the mean of positions is, modulo 1, in [-0.5, 0.5].
+double circular_mean(const std::vector<double>& positions) {
+  double cosines = 0, sines = 0;
+  for (const double x : positions) {
+    cosines += std::cos(2 * M_PI * x);
+    sines += std::sin(2 * M_PI * x);
+  }
+  return std::atan2(sines, cosines) / (2 * M_PI);
+}
+
+}  // namespace
+
+VoxelLattice place_lattice(const Surface& geometry, const dvec3& middle, double voxel_size) {
+  const std::vector<dvec3> points = spread_points(geometry);
+  std::vector<double> positions(points.size());
+  dvec3 origin;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::transform(points.begin(), points.end(), positions.begin(),
+                   [&](const dvec3& point) { return (point[axis] - middle[axis]) / voxel_size; });
+    const double mean = circular_mean(positions);
+    origin[axis] = mean > 0 ? mean - 0.5 : mean + 0.5;  // the mean, half a voxel from a corner
+  }
+  return {middle + origin * voxel_size, voxel_size};
+}
+
+}  // namespace farfield
