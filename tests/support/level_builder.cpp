@@ -239,15 +239,10 @@ LevelData full_level_of_version_2() {
 }
 
 LevelData full_level_of_version_3() {
-  LevelData level = full_level();
-  level.header.hot_spot = 0.15f;
-  return level;
-}
-
-LevelData full_level_of_version_4() {
   LevelData level = full_level_of_version_2();
   level.header.hot_spot = 0.15f;
   level.face_gap = counted<uint8_t>(3, 17);
+  level.header.hot_spot = 0.15f;
   return level;
 }
 

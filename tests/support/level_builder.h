@@ -56,7 +56,7 @@ std::vector<LevelData> white_sphere(uint32_t rings = 64);
 LevelData full_level();
 /// The same with those of the second version too.
 LevelData full_level_of_version_2();
-/// full_level() with a hot spot.
+/// And with those of the third.
 LevelData full_level_of_version_3();
 /// All sections and a hot spot.
 LevelData full_level_of_version_4();
