@@ -240,7 +240,6 @@ LevelData full_level_of_version_2() {
 
 LevelData full_level_of_version_3() {
   LevelData level = full_level_of_version_2();
-  level.header.hot_spot = 0.15f;
   level.face_gap = counted<uint8_t>(3, 17);
   level.header.hot_spot = 0.15f;
   return level;

@@ -145,7 +145,7 @@ TEST(LevelFormat, GoldenBytesOfVersion3AreFrozen) {
 }
 
 TEST(LevelFormat, GapsMustBelongToFaces) {
-  LevelData level = test::full_level_of_version_4();
+  LevelData level = test::full_level_of_version_3();
   level.face_gap.pop_back();
   EXPECT_EQ(find_structure_problem(view_of(level)).value_or(""), "face_gap has 2 elements for 3 faces");
 }
@@ -279,7 +279,7 @@ TEST(HostileLevelFile, HeaderAndTableFieldsAreChecked) {
   const std::vector<Case> cases = {
       {"does not start as a level file", [](auto& h, auto*) { h.magic[1] = 'X'; }},
       {"the format version is 0", [](auto& h, auto*) { h.version = 0; }},
-      {"level format 5, and this Farfield reads up to 4", [](auto& h, auto*) { h.version = 5; },
+      {"level format 4, and this Farfield reads up to 3", [](auto& h, auto*) { h.version = 4; },
        ErrorCode::Unsupported},
       {"the header says", [](auto& h, auto*) { h.file_bytes = kHuge; }},
       {"sections leaves the file", [](auto& h, auto*) { h.section_count = 0xffffffffu; }},

@@ -97,7 +97,7 @@ TEST(Brick, PayloadIndicesOfTheActiveVoxelsCountUp) {
 }
 
 TEST(LevelView, ShowsEveryArrayOfItsLevel) {
-  const LevelData level = test::full_level_of_version_4();
+  const LevelData level = test::full_level_of_version_3();
   const LevelView view = view_of(level);
   std::vector<std::span<const std::byte>> owned, seen;
   for_each_section(level, [&](SectionId, const auto& array) { owned.push_back(std::as_bytes(std::span(array))); });
