@@ -26,7 +26,7 @@ namespace {
 constexpr double kCell = 0.25;  ///< of the resolution: voxels, and the widest gap that is closed for sure
 constexpr uint32_t kRaysPerFace = 4;
 constexpr float kLeastCosine = 0.15f;  ///< rays that are flatter are cast at this angle
-constexpr float kLeastGap = 0.015f;    ///< share of rays through the wall below which it counts as tight
+constexpr float kLeastGap = 0.03f;     ///< share of rays through the wall below which it counts as tight
 constexpr float kEscapeLength = 1;     ///< in resolutions: how far light must get away
 
 /// Which voxels a set holds.
