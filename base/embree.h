@@ -132,6 +132,15 @@ inline void detach_geometry(EmbreeSceneRef scene, unsigned id) { rtcDetachGeomet
 /// it takes and which of two equal hits is reported; and a thread that waits in here must not run a foreign task.
 EmbreeScene build_static_scene(EmbreeDeviceRef device, EmbreeGeometryRef geometry);
 
+/// A committed instance of a scene as Embree itself has them: what ours are measured against.
+inline EmbreeGeometry new_native_instance(EmbreeDeviceRef device, EmbreeSceneRef object, const mat4x3& local_to_world) {
+  EmbreeGeometry instance(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE));
+  rtcSetGeometryInstancedScene(instance.get(), object);
+  rtcSetGeometryTransform(instance.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, &local_to_world);
+  commit_geometry(instance.get());
+  return instance;
+}
+
 // --- Rays ------------------------------------------------------------------------------------------------------------
 
 inline EmbreeContext make_context() {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two nested DDAs [Amanatides and Woo 1987], over bricks and over the voxels of a brick, and exact free flight in the
-// piecewise constant medium that they enumerate.
+// piecewise constant medium that they enumerate. A ray that cannot collide in what is occupied looks at no brick, and a
+// brick in which few collisions are likely is skimmed [Woodcock et al. 1965] instead of crossed: its densest voxel
+// stands for all, so that no voxel is looked at but where a tentative collision is (docs/decisions/0018).
 //
-// Densities (1 byte per voxel) are read for every voxel, the 6 bytes of a voxel's SGGX matrix only where they may
-// matter: since lambda_max(S) = 1, rho |d| bounds the attenuation rho sqrt(d^T S d). So:
+// In bricks that are crossed, densities (1 byte per voxel) are read for every voxel, the 6 bytes of a voxel's SGGX
+// matrix only where they may matter: since lambda_max(S) = 1, rho |d| bounds the attenuation rho sqrt(d^T S d). So:
 //
 //   1. fly with rho |d| until a tentative collision, in some voxel V at s_c;
 //   2. fetch S of V; the collision is real with probability sigma = sqrt(d^T S d) / |d|;
@@ -18,6 +20,7 @@
 #include "bvh/brick_volume.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -31,18 +34,47 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // Six-byte matrices have eigenvalues up to 1 + 1/127 (docs/theory.md, section 10.10), so sigma may reach its square
 // root.
 constexpr float kSigmaBound = 1.00393f;
+// Bricks are skimmed up to this many expected tentative collisions, each of which costs as much as a few voxels.
+constexpr float kMostSkimmed = 2.0f;
 
-/// Random numbers of one flight: a function of the seed and a counter.
+/// Random numbers of one flight: splitmix64 [Steele, Lea and Flood 2014] from the seed.
 class FlightRandom {
  public:
-  explicit FlightRandom(uint64_t seed) : seed_(seed) {}
-  float uniform() { return to_unit_float(mix64(seed_, counter_++)); }
-  float optical_depth() { return -std::log1p(-uniform()); }
+  explicit FlightRandom(uint64_t seed) : state_(seed) {}
+  float uniform() { return to_unit_float(mix64(state_ += 0x9e3779b97f4a7c15ull)); }
+  float optical_depth() { return -std::log(1.0f - uniform()); }  // 24 bits: the difference is exact and not 0
 
  private:
-  uint64_t seed_;
-  uint64_t counter_ = 0;
+  uint64_t state_;
 };
+
+/// Of the voxels of a brick that are not empty; exclusive upper corner, empty if all are.
+struct VoxelRange {
+  ivec3 lower{kBrickSide};
+  ivec3 upper{0};
+  void extend(int axis, uint64_t bits) {
+    if (bits == 0) return;
+    lower[axis] = std::countr_zero(bits);
+    upper[axis] = 64 - std::countl_zero(bits);
+  }
+};
+VoxelRange occupied_voxels(const Brick& brick) {
+  static_assert(kBrickSide == 8);  // a word is a slice of constant z, and a byte of it a row along x
+  uint64_t slices = 0, slice = 0, rows = 0, row = 0;
+  for (int z = 0; z < kBrickSide; ++z) {
+    const uint64_t word = brick.mask[static_cast<size_t>(z)];
+    slices |= uint64_t{word != 0} << z;
+    slice |= word;
+  }
+  for (int y = 0; y < kBrickSide; ++y) {
+    const uint64_t byte = (slice >> (8 * y)) & 0xff;
+    rows |= uint64_t{byte != 0} << y;
+    row |= byte;
+  }
+  VoxelRange range;
+  range.extend(0, row), range.extend(1, rows), range.extend(2, slices);
+  return range;
+}
 
 int clamped_cell(float coordinate, int count) {
   // The negated comparison also sends NaN to 0; the conversion is in range after it.
@@ -64,7 +96,7 @@ struct Walk {
   /// origin: cell (0,0,0)'s lower corner on the ray's scale; side: of a cell.
   Walk(const vec3& entry, const vec3& direction, const vec3& inverse, const vec3& origin, float side, float s_begin,
        const ivec3& count) {
-    const vec3 p = (entry + s_begin * direction - origin) / side;
+    const vec3 p = (entry + s_begin * direction - origin) * (1.0f / side);  // sides are powers of two
     for (int axis = 0; axis < 3; ++axis) {
       cell[axis] = clamped_cell(p[axis], count[axis]);
       const float plane = origin[axis] + side * static_cast<float>(cell[axis] + (direction[axis] > 0.0f ? 1 : 0));
@@ -111,7 +143,25 @@ BrickVolume::BrickVolume(const LevelView& level)
       voxel_sggx_(level.voxel_sggx),
       brick_dims_(level.header.brick_dims),
       origin_(level.header.volume_origin),
-      inverse_voxel_size_(1.0f / level.header.resolution) {}
+      inverse_voxel_size_(1.0f / level.header.resolution) {
+  find_what_is_occupied(level);
+}
+
+void BrickVolume::find_what_is_occupied(const LevelView& level) {
+  for (size_t i = 0; i < brick_table_.size(); ++i) {
+    if (brick_table_[i] == kNoBrick) continue;
+    const Brick& brick = bricks_[brick_table_[i]];
+    const VoxelRange voxels = occupied_voxels(brick);
+    if (voxels.upper.x == 0) continue;
+    const ivec3 corner = brick_coordinates(level.header, i) * kBrickSide;
+    occupied_.extend(vec3(corner + voxels.lower));
+    occupied_.extend(vec3(corner + voxels.upper));
+    densest_scale_ = std::max(densest_scale_, brick.density_scale);
+  }
+  if (!(densest_scale_ > 0)) bricks_ = {};  // nothing that a ray could meet
+}
+
+float BrickVolume::attenuation_bound() const { return voxel_sggx_.empty() ? 1.0f : kSigmaBound; }
 
 float BrickVolume::projected_area(uint32_t payload, const vec3& unit_direction) const {
   return std::sqrt(std::max(0.0f, unpack(voxel_sggx_[payload]).quadratic(unit_direction)));
@@ -120,7 +170,7 @@ float BrickVolume::projected_area(uint32_t payload, const vec3& unit_direction) 
 bool BrickVolume::cross_brick(Flight& flight, const Brick& brick, const ivec3& brick_cell, float s_begin,
                               float s_end) const {
   static const ivec3 kSide(kBrickSide);
-  const float bound = voxel_sggx_.empty() ? 1.0f : kSigmaBound;
+  const float bound = attenuation_bound();
   const float rate_per_density = brick.density_scale * (1.0f / 255.0f) * flight.speed;  // of true attenuation, per s
   const vec3 corner = vec3(brick_cell * kBrickSide);
   Walk walk(flight.entry, flight.direction, flight.inverse, corner, 1.0f, s_begin, kSide);
@@ -152,38 +202,75 @@ bool BrickVolume::cross_brick(Flight& flight, const Brick& brick, const ivec3& b
   }
 }
 
+// Flies with the attenuation that the brick has at most; a tentative collision is real as often as the voxel's own is
+// of that.
+bool BrickVolume::skim_brick(Flight& flight, const Brick& brick, const ivec3& brick_cell, float s_begin,
+                             float s_end) const {
+  const float bound = attenuation_bound();
+  const float rate = brick.density_scale * bound * flight.speed;
+  const vec3 corner = vec3(brick_cell * kBrickSide);
+  for (float s = s_begin;;) {
+    const float depth_to_end = rate * (s_end - s);
+    if (depth_to_end <= flight.depth_left) {
+      flight.depth_left -= depth_to_end;
+      return false;
+    }
+    s += flight.depth_left / rate;
+    flight.depth_left = flight.random.optical_depth();
+    const vec3 p = flight.entry + s * flight.direction - corner;
+    const int voxel = clamped_cell(p.x, kBrickSide) +
+                      kBrickSide * (clamped_cell(p.y, kBrickSide) + kBrickSide * clamped_cell(p.z, kBrickSide));
+    const float share = static_cast<float>(brick.density[static_cast<size_t>(voxel)]) * (1.0f / 255.0f);
+    const float u = flight.random.uniform();
+    if (!(u < share)) continue;
+    flight.s_hit = s;
+    flight.payload_hit = brick.payload_index(voxel);
+    if (voxel_sggx_.empty()) return true;
+    if (u * bound < share * projected_area(flight.payload_hit, flight.unit_direction)) return true;
+  }
+}
+
 std::optional<VolumeHit> BrickVolume::first_collision(const LocalRay& ray, uint64_t seed) const {
   if (is_empty()) return std::nullopt;
   const LocalRay in_voxels{(ray.origin - origin_) * inverse_voxel_size_, ray.direction * inverse_voxel_size_,
                            ray.t_near, ray.t_far};
   if (!is_traceable(in_voxels)) return std::nullopt;
-  const RayRange range = clip_to_box(in_voxels, Box3{vec3(0.0f), vec3(brick_dims_ * kBrickSide)});
+  const RayRange range = clip_to_box(in_voxels, occupied_);
   if (range.is_empty() || !std::isfinite(range.t_far)) return std::nullopt;  // an infinite range has no direction
 
   const float speed = glm::length(ray.direction);
   if (!(speed > 0.0f && speed < kInfinity)) return std::nullopt;
+  FlightRandom random(seed);
+  const float depth = random.optical_depth();
+  const float s_end = range.t_far - range.t_near;
+  if (densest_scale_ * attenuation_bound() * speed * s_end < depth) return std::nullopt;
+
   const vec3& d = in_voxels.direction;
+  const vec3 inverse = 1.0f / d;
   const auto sign = [](float x) { return x > 0.0f ? 1 : -1; };
   Flight flight{in_voxels.origin + range.t_near * d,
                 d,
-                1.0f / d,
+                inverse,
                 {sign(d.x), sign(d.y), sign(d.z)},
-                glm::abs(1.0f / d),
+                {std::abs(inverse.x), std::abs(inverse.y), std::abs(inverse.z)},  // glm::abs branches
                 ray.direction / speed,
                 speed,
-                0.0f,
-                FlightRandom(seed)};
-  flight.depth_left = flight.random.optical_depth();
-
-  const float s_end = range.t_far - range.t_near;
+                depth,
+                random};
+  const float bound = attenuation_bound() * speed;
   const vec3 brick_delta = flight.delta * static_cast<float>(kBrickSide);
   Walk walk(flight.entry, flight.direction, flight.inverse, vec3(0.0f), static_cast<float>(kBrickSide), 0.0f,
             brick_dims_);
   for (float s = 0.0f;;) {
-    const float s_next = std::min(walk.exit(), s_end);
-    const uint32_t brick = brick_table_[table_index(walk.cell, brick_dims_)];
-    if (brick != kNoBrick && s_next > s && cross_brick(flight, bricks_[brick], walk.cell, s, s_next)) {
-      return VolumeHit{std::min(range.t_near + flight.s_hit, range.t_far), flight.payload_hit};
+    const float s_exit = walk.exit(), s_next = std::min(s_exit, s_end);
+    const uint32_t index = brick_table_[table_index(walk.cell, brick_dims_)];
+    if (index != kNoBrick && s_next > s) {
+      const Brick& brick = bricks_[index];
+      // By the whole chord, so that where the ray ends changes nothing before.
+      const bool is_faint = brick.density_scale * bound * (s_exit - s) <= kMostSkimmed;
+      const bool hits =
+          is_faint ? skim_brick(flight, brick, walk.cell, s, s_next) : cross_brick(flight, brick, walk.cell, s, s_next);
+      if (hits) return VolumeHit{std::min(range.t_near + flight.s_hit, range.t_far), flight.payload_hit};
     }
     if (s_next >= s_end || !walk.step(flight.sign, brick_delta, brick_dims_)) return std::nullopt;
     s = std::max(s, s_next);

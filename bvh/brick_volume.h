@@ -70,7 +70,11 @@ class BrickVolume {
 
  private:
   struct Flight;
+  void find_what_is_occupied(const LevelView& level);
+  /// What sigma_t is at most for a density of 1 / scene unit.
+  float attenuation_bound() const;
   bool cross_brick(Flight& flight, const Brick& brick, const ivec3& brick_cell, float s_begin, float s_end) const;
+  bool skim_brick(Flight& flight, const Brick& brick, const ivec3& brick_cell, float s_begin, float s_end) const;
   /// sqrt(d^T S d) / |d| of the voxel, d the ray's direction.
   float projected_area(uint32_t payload, const vec3& unit_direction) const;
 
@@ -80,6 +84,8 @@ class BrickVolume {
   ivec3 brick_dims_{0};
   vec3 origin_{0.0f};
   float inverse_voxel_size_ = 0;
+  Box3 occupied_;            ///< of voxels that are not empty; in voxels
+  float densest_scale_ = 0;  ///< the largest density_scale of all bricks
 };
 
 }  // namespace farfield

@@ -140,11 +140,7 @@ class Bench : public LevelSource {
     const EmbreeScene object = build_static_scene(host_.get(), mesh.get());
     EmbreeScene scene = new_scene(host_.get());
     for (const mat4x3& m : places) {
-      const EmbreeGeometry instance(rtcNewGeometry(host_.get(), RTC_GEOMETRY_TYPE_INSTANCE));
-      rtcSetGeometryInstancedScene(instance.get(), object.get());
-      rtcSetGeometryTransform(instance.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, &m);
-      commit_geometry(instance.get());
-      attach_geometry(scene.get(), instance.get());
+      attach_geometry(scene.get(), new_native_instance(host_.get(), object.get(), m).get());
     }
     commit_scene(scene.get());
     return scene;

@@ -84,7 +84,6 @@ const std::set<std::string> kMayNameEmbree = {
     "runtime/interaction_model.h",
     "runtime/runtime.cpp",
     // Embree's own instances, to compare with; packets and streams
-    "tests/bench/bvh_bench.cpp",
     "tests/unit/bvh/instance_geometry_test.cpp",
 };
 
