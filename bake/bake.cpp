@@ -200,21 +200,12 @@ uint64_t least_shell_bytes(const Surface& wall, double resolution) {
 void add_to_hull(const LevelView& level, SlabHull& hull) {
   for (const vec3& position : level.positions) hull.add(position);
   const float voxel_size = level.header.resolution;
-  const ivec3 dims = level.header.brick_dims;
   for (size_t cell = 0; cell < level.brick_table.size(); ++cell) {
     if (level.brick_table[cell] == kNoBrick) continue;
-    const int at = static_cast<int>(cell);
-    const ivec3 brick_at(at % dims.x, at / dims.x % dims.y, at / dims.x / dims.y);
-    ivec3 lower(kBrickSide), upper(0);
-    const Brick& brick = level.bricks[level.brick_table[cell]];
-    for (int i = 0; i < kBrickVoxels; ++i) {
-      if (brick.density[static_cast<size_t>(i)] == 0) continue;
-      const ivec3 voxel(i % kBrickSide, i / kBrickSide % kBrickSide, i / (kBrickSide * kBrickSide));
-      lower = glm::min(lower, voxel);
-      upper = glm::max(upper, voxel + 1);
-    }
+    const Box3 voxels = active_box(level.bricks[level.brick_table[cell]]);
+    const ivec3 brick_at = brick_coordinates(level.header, cell);
     const vec3 corner = level.header.volume_origin + vec3(brick_at * kBrickSide) * voxel_size;
-    hull.add(Box3{corner + vec3(lower) * voxel_size, corner + vec3(upper) * voxel_size});
+    hull.add(Box3{corner + voxels.lower * voxel_size, corner + voxels.upper * voxel_size});
   }
 }
 

@@ -272,7 +272,7 @@ Brick pack_brick(const SparseVolume& volume, const VoxelBrick& source) {
   const Voxel* voxels = &volume.voxels[source.first_voxel];
   for (uint32_t i = 0; i < count; ++i) brick.density_scale = std::max(brick.density_scale, voxels[i].density);
   for (int i = 0; i < kBrickVoxels; ++i) {
-    if (!(source.mask[static_cast<size_t>(i >> 6)] >> (i & 63) & 1)) continue;
+    if (!is_set(source.mask, i)) continue;
     const float density = voxels[brick.payload_index(i) - brick.payload_base].density;
     const float step = std::round(255.0f * density / brick.density_scale);
     brick.density[static_cast<size_t>(i)] = static_cast<uint8_t>(std::clamp(step, 1.0f, 255.0f));
@@ -284,8 +284,8 @@ Brick pack_brick(const SparseVolume& volume, const VoxelBrick& source) {
 Box3 stored_bounds(const SparseVolume& volume, const VoxelBrick& brick) {
   Box3 box;
   for (int i = 0; i < kBrickVoxels; ++i) {
-    if (!(brick.mask[static_cast<size_t>(i >> 6)] >> (i & 63) & 1)) continue;
-    const dvec3 corner = dvec3(brick.coordinate * kBrickSide + ivec3(i & 7, i >> 3 & 7, i >> 6));
+    if (!is_set(brick.mask, i)) continue;
+    const dvec3 corner = dvec3(voxel_of_brick(brick.coordinate, i));
     box.extend(vec3(volume.lattice.origin + corner * volume.lattice.voxel_size));
     box.extend(vec3(volume.lattice.origin + (corner + 1.0) * volume.lattice.voxel_size));
   }

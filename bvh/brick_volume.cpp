@@ -20,11 +20,11 @@
 #include "bvh/brick_volume.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 
 #include "base/hash.h"
+#include "base/split_mix.h"
 
 namespace farfield {
 
@@ -37,44 +37,16 @@ constexpr float kSigmaBound = 1.00393f;
 // Bricks are skimmed up to this many expected tentative collisions, each of which costs as much as a few voxels.
 constexpr float kMostSkimmed = 2.0f;
 
-/// Random numbers of one flight: splitmix64 [Steele, Lea and Flood 2014] from the seed.
+/// Random numbers of one flight.
 class FlightRandom {
  public:
-  explicit FlightRandom(uint64_t seed) : state_(seed) {}
-  float uniform() { return to_unit_float(mix64(state_ += 0x9e3779b97f4a7c15ull)); }
+  explicit FlightRandom(uint64_t seed) : bits_(seed) {}
+  float uniform() { return to_unit_float(bits_.next()); }
   float optical_depth() { return -std::log(1.0f - uniform()); }  // 24 bits: the difference is exact and not 0
 
  private:
-  uint64_t state_;
+  SplitMix bits_;
 };
-
-/// Of the voxels of a brick that are not empty; exclusive upper corner, empty if all are.
-struct VoxelRange {
-  ivec3 lower{kBrickSide};
-  ivec3 upper{0};
-  void extend(int axis, uint64_t bits) {
-    if (bits == 0) return;
-    lower[axis] = std::countr_zero(bits);
-    upper[axis] = 64 - std::countl_zero(bits);
-  }
-};
-VoxelRange occupied_voxels(const Brick& brick) {
-  static_assert(kBrickSide == 8);  // a word is a slice of constant z, and a byte of it a row along x
-  uint64_t slices = 0, slice = 0, rows = 0, row = 0;
-  for (int z = 0; z < kBrickSide; ++z) {
-    const uint64_t word = brick.mask[static_cast<size_t>(z)];
-    slices |= uint64_t{word != 0} << z;
-    slice |= word;
-  }
-  for (int y = 0; y < kBrickSide; ++y) {
-    const uint64_t byte = (slice >> (8 * y)) & 0xff;
-    rows |= uint64_t{byte != 0} << y;
-    row |= byte;
-  }
-  VoxelRange range;
-  range.extend(0, row), range.extend(1, rows), range.extend(2, slices);
-  return range;
-}
 
 int clamped_cell(float coordinate, int count) {
   // The negated comparison also sends NaN to 0; the conversion is in range after it.
@@ -151,11 +123,10 @@ void BrickVolume::find_what_is_occupied(const LevelView& level) {
   for (size_t i = 0; i < brick_table_.size(); ++i) {
     if (brick_table_[i] == kNoBrick) continue;
     const Brick& brick = bricks_[brick_table_[i]];
-    const VoxelRange voxels = occupied_voxels(brick);
-    if (voxels.upper.x == 0) continue;
-    const ivec3 corner = brick_coordinates(level.header, i) * kBrickSide;
-    occupied_.extend(vec3(corner + voxels.lower));
-    occupied_.extend(vec3(corner + voxels.upper));
+    const Box3 voxels = active_box(brick);
+    if (voxels.is_empty()) continue;
+    const vec3 corner(brick_coordinates(level.header, i) * kBrickSide);
+    occupied_.extend(Box3{corner + voxels.lower, corner + voxels.upper});
     densest_scale_ = std::max(densest_scale_, brick.density_scale);
   }
   if (!(densest_scale_ > 0)) bricks_ = {};  // nothing that a ray could meet
@@ -242,8 +213,8 @@ std::optional<VolumeHit> BrickVolume::first_collision(const LocalRay& ray, uint6
   if (!(speed > 0.0f && speed < kInfinity)) return std::nullopt;
   FlightRandom random(seed);
   const float depth = random.optical_depth();
-  const float s_end = range.t_far - range.t_near;
-  if (densest_scale_ * attenuation_bound() * speed * s_end < depth) return std::nullopt;
+  const float s_end = range.t_far - range.t_near, bound = attenuation_bound() * speed;
+  if (densest_scale_ * bound * s_end < depth) return std::nullopt;
 
   const vec3& d = in_voxels.direction;
   const vec3 inverse = 1.0f / d;
@@ -257,7 +228,6 @@ std::optional<VolumeHit> BrickVolume::first_collision(const LocalRay& ray, uint6
                 speed,
                 depth,
                 random};
-  const float bound = attenuation_bound() * speed;
   const vec3 brick_delta = flight.delta * static_cast<float>(kBrickSide);
   Walk walk(flight.entry, flight.direction, flight.inverse, vec3(0.0f), static_cast<float>(kBrickSide), 0.0f,
             brick_dims_);

@@ -2,6 +2,7 @@
 #include "cache/level.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace farfield {
@@ -15,6 +16,25 @@ uint8_t to_unorm8(float x) {
 }
 
 }  // namespace
+
+Box3 active_box(const Brick& brick) {
+  static_assert(kBrickSide == 8);  // a word is a slice of constant z, and a byte of it a row along x
+  uint64_t slices = 0, slice = 0, rows = 0, row = 0;
+  for (int z = 0; z < kBrickSide; ++z) {
+    const uint64_t word = brick.mask[static_cast<size_t>(z)];
+    slices |= uint64_t{word != 0} << z;
+    slice |= word;
+  }
+  for (int y = 0; y < kBrickSide; ++y) {
+    const uint64_t byte = (slice >> (8 * y)) & 0xff;
+    rows |= uint64_t{byte != 0} << y;
+    row |= byte;
+  }
+  if (slices == 0) return {};
+  const auto first = [](uint64_t bits) { return static_cast<float>(std::countr_zero(bits)); };
+  const auto end = [](uint64_t bits) { return static_cast<float>(std::bit_width(bits)); };
+  return {{first(row), first(rows), first(slices)}, {end(row), end(rows), end(slices)}};
+}
 
 uint8_t pack_unorm8(float x) { return to_unorm8(x); }
 

@@ -88,6 +88,9 @@ struct alignas(64) Brick {
 };
 static_assert(sizeof(Brick) == 640);
 
+/// The box of the brick's voxels that are not empty, in voxels from its corner.
+Box3 active_box(const Brick& brick);
+
 /// Where a morph map sends things of level k-1 (thesis 8.1.2, 10.1.2).
 inline constexpr uint32_t kMorphVoxelized = 0xffffffffu;  ///< it became part of the volume of level k: fades out
 inline constexpr uint32_t kMorphCollapsed = 0xfffffffeu;  ///< (faces) its area shrinks to 0 while vertices move

@@ -217,18 +217,6 @@ Problem check_positions(const LevelView& level) {
                      found->y, found->z);
 }
 
-/// The box, in voxels relative to the brick, of its active voxels.
-Box3 active_box(const Brick& brick) {
-  Box3 box;
-  for (int i = 0; i < kBrickVoxels; ++i) {
-    if (brick.density[static_cast<size_t>(i)] == 0) continue;
-    const vec3 lower(static_cast<float>(i % 8), static_cast<float>(i / 8 % 8), static_cast<float>(i / 64));
-    box.extend(lower);
-    box.extend(lower + 1.0f);
-  }
-  return box;
-}
-
 /// Bounds are tight around rounded sums (origin + voxel * resolution), so allow the rounding of those.
 Problem check_voxels_inside(const LevelView& level) {
   const LevelHeader& header = level.header;

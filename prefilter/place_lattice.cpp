@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "prefilter/isotropic_lines.h"
+#include "prefilter/triangle_pieces.h"
 
 namespace farfield {
 namespace {
@@ -17,12 +18,11 @@ constexpr uint64_t kPoints = 16384;  ///< leave 1 % of a voxel's circle to chanc
 
 /// Points spread evenly over what stops rays. None if there is no area.
 std::vector<dvec3> spread_points(const Surface& geometry) {
-  const auto corner = [&](size_t face, int c) { return dvec3(geometry.positions[geometry.triangles[face][c]]); };
   std::vector<double> area_until;
   double area = 0;
   for (size_t f = 0; f < geometry.triangles.size(); ++f) {
-    const dvec3 across = glm::cross(corner(f, 1) - corner(f, 0), corner(f, 2) - corner(f, 0));
-    area += glm::length(across) * static_cast<double>(geometry.materials[f].stopped_share());
+    area += glm::length(area_vector_of(corners_of(geometry, f))) *
+            static_cast<double>(geometry.materials[f].stopped_share());
     area_until.push_back(area);
   }
   std::vector<dvec3> points;
@@ -32,9 +32,7 @@ std::vector<dvec3> spread_points(const Surface& geometry) {
     const auto u = even_coordinates(i, 0);
     const auto found = std::upper_bound(area_until.begin(), area_until.end() - 1, u[0] * area);
     const auto face = static_cast<size_t>(found - area_until.begin());
-    const double root = std::sqrt(u[1]);
-    points.push_back((1 - root) * corner(face, 0) + root * (1 - u[2]) * corner(face, 1) +
-                     root * u[2] * corner(face, 2));
+    points.push_back(point_on(corners_of(geometry, face), u[1], u[2]));
   }
   return points;
 }

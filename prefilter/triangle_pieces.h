@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdint>
+#include <cmath>
 
 #include "base/vec.h"
 #include "prefilter/surface.h"
@@ -31,30 +31,28 @@ void for_each_piece(const TrianglePiece& t, double longest, Visit&& visit) {
   for_each_piece({apex, middle, to}, longest, visit);
 }
 
-inline TrianglePiece corners_of(const Surface& surface, size_t face) {
-  const uvec3& t = surface.triangles[face];
+inline TrianglePiece corners_of(const Surface& surface, const uvec3& t) {
   return {dvec3(surface.positions[t.x]), dvec3(surface.positions[t.y]), dvec3(surface.positions[t.z])};
+}
+inline TrianglePiece corners_of(const Surface& surface, size_t face) {
+  return corners_of(surface, surface.triangles[face]);
+}
+
+/// In cells of this side, from `origin`.
+inline TrianglePiece in_cells(const TrianglePiece& t, const dvec3& origin, double side) {
+  return {(t[0] - origin) / side, (t[1] - origin) / side, (t[2] - origin) / side};
 }
 
 inline dvec3 middle_of(const TrianglePiece& t) { return (t[0] + t[1] + t[2]) / 3.0; }
 /// Twice the area, along the normal.
 inline dvec3 area_vector_of(const TrianglePiece& t) { return glm::cross(t[1] - t[0], t[2] - t[0]); }
 
-/// A cell of a grid as one number. Coordinates must be within 2^20 of 0.
-inline uint64_t cell_key(const ivec3& cell) {
-  constexpr int kLimit = 1 << 20;
-  const auto biased = [](int v) { return static_cast<uint64_t>(v + kLimit) & 0x1fffff; };
-  return biased(cell.z) << 42 | biased(cell.y) << 21 | biased(cell.x);
-}
-
-/// Calls visit(cell) for the (2 reach + 1)^3 cells around one.
-template <typename Visit>
-void for_each_cell_around(const ivec3& cell, int reach, Visit&& visit) {
-  for (int z = -reach; z <= reach; ++z) {
-    for (int y = -reach; y <= reach; ++y) {
-      for (int x = -reach; x <= reach; ++x) visit(cell + ivec3(x, y, z));
-    }
-  }
+/// Uniform on the triangle for uniform u and v in [0, 1).
+template <typename T>
+glm::vec<3, T> point_on(const TrianglePiece& t, T u, T v) {
+  using Vec = glm::vec<3, T>;
+  const T root = std::sqrt(u);
+  return Vec(t[0]) * (1 - root) + Vec(t[1]) * (root * (1 - v)) + Vec(t[2]) * (root * v);
 }
 
 }  // namespace farfield

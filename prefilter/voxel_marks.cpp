@@ -7,19 +7,10 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "prefilter/triangle_pieces.h"
 
 namespace farfield {
 namespace {
-
-/// A brick's place in the order of the file, as one number.
-uint64_t brick_key(const ivec3& b) {
-  const auto biased = [](int v) { return static_cast<uint64_t>(v + kVoxelLimit); };
-  return biased(b.z) << 42 | biased(b.y) << 21 | biased(b.x);
-}
-ivec3 brick_of_key(uint64_t key) {
-  const auto part = [&](int shift) { return static_cast<int>(key >> shift & 0x1fffff) - kVoxelLimit; };
-  return {part(0), part(21), part(42)};
-}
 
 /// A voxel of a brick: the brick's key and the bit.
 struct MarkedVoxel {
@@ -33,26 +24,15 @@ void sort_unique(std::vector<MarkedVoxel>& marks) {
   marks.erase(std::unique(marks.begin(), marks.end()), marks.end());
 }
 
-/// Marks the voxels that a triangle, given in voxel units, may touch: halves it until it is about as small as a voxel,
-/// then takes the box of each piece.
-void mark_triangle(const dvec3& a, const dvec3& b, const dvec3& c, std::vector<MarkedVoxel>& marks) {
-  const dvec3 edge[3] = {b - a, c - b, a - c};
-  const double length2[3] = {glm::dot(edge[0], edge[0]), glm::dot(edge[1], edge[1]), glm::dot(edge[2], edge[2])};
-  const int longest = static_cast<int>(std::max_element(length2, length2 + 3) - length2);
-  if (length2[longest] > 1) {
-    const dvec3 corner[3] = {a, b, c};
-    const dvec3 &from = corner[longest], &to = corner[(longest + 1) % 3], &apex = corner[(longest + 2) % 3];
-    const dvec3 middle = 0.5 * (from + to);
-    mark_triangle(apex, from, middle, marks);
-    mark_triangle(apex, middle, to, marks);
-    return;
-  }
+/// Marks the voxels in the box of a piece of a triangle that is about as small as a voxel; in voxel units.
+void mark_piece(const TrianglePiece& t, std::vector<MarkedVoxel>& marks) {
+  const auto& [a, b, c] = t;
   const ivec3 lower(glm::floor(glm::min(a, glm::min(b, c)))), upper(glm::floor(glm::max(a, glm::max(b, c))));
   for (int z = lower.z; z <= upper.z; ++z) {
     for (int y = lower.y; y <= upper.y; ++y) {
       for (int x = lower.x; x <= upper.x; ++x) {
         marks.push_back(
-            {brick_key({x >> 3, y >> 3, z >> 3}), static_cast<uint32_t>((x & 7) + 8 * (y & 7) + 64 * (z & 7))});
+            {cell_key({x >> 3, y >> 3, z >> 3}), static_cast<uint32_t>((x & 7) + 8 * (y & 7) + 64 * (z & 7))});
       }
     }
   }
@@ -116,13 +96,10 @@ VoxelSet mark_voxels(const Surface& geometry, const VoxelLattice& lattice) {
   std::vector<std::vector<MarkedVoxel>> per_chunk(chunks);
   parallel_for(geometry.triangles.size(), kGrain, [&](size_t begin, size_t end) {
     std::vector<MarkedVoxel>& marks = per_chunk[begin / kGrain];
-    const auto to_voxels = [&](uint32_t vertex) {
-      return (dvec3(geometry.positions[vertex]) - lattice.origin) / lattice.voxel_size;
-    };
     size_t limit = 1 << 20;
     for (size_t i = begin; i < end; ++i) {
-      const uvec3& t = geometry.triangles[i];
-      mark_triangle(to_voxels(t.x), to_voxels(t.y), to_voxels(t.z), marks);
+      for_each_piece(in_cells(corners_of(geometry, i), lattice.origin, lattice.voxel_size), 1,
+                     [&](const TrianglePiece& piece) { mark_piece(piece, marks); });
       if (marks.size() > limit) {
         sort_unique(marks);
         limit = std::max<size_t>(limit, 2 * marks.size());
@@ -140,7 +117,7 @@ VoxelSet mark_voxels(const Surface& geometry, const VoxelLattice& lattice) {
   VoxelSet set;
   for (size_t i = 0; i < all.size(); ++i) {
     if (i == 0 || all[i].brick != all[i - 1].brick) {
-      set.coordinates.push_back(brick_of_key(all[i].brick));
+      set.coordinates.push_back(cell_of_key(all[i].brick));
       set.masks.push_back({});
     }
     set.masks.back()[all[i].bit >> 6] |= uint64_t{1} << (all[i].bit & 63);
@@ -153,9 +130,9 @@ VoxelSet widen(const VoxelSet& set, double reach) {
   std::unordered_map<uint64_t, const VoxelMask*> mask_of;
   std::vector<uint64_t> keys;
   for (size_t i = 0; i < set.coordinates.size(); ++i) {
-    mask_of[brick_key(set.coordinates[i])] = &set.masks[i];
+    mask_of[cell_key(set.coordinates[i])] = &set.masks[i];
     for (int n = 0; n < 27; ++n) {
-      keys.push_back(brick_key(set.coordinates[i] + ivec3(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)));
+      keys.push_back(cell_key(set.coordinates[i] + ivec3(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)));
     }
   }
   std::sort(keys.begin(), keys.end());
@@ -166,7 +143,7 @@ VoxelSet widen(const VoxelSet& set, double reach) {
     for (size_t i = begin; i < end; ++i) {
       std::array<const VoxelMask*, 27> neighbours{};
       for (int n = 0; n < 27; ++n) {
-        const auto found = mask_of.find(brick_key(brick_of_key(keys[i]) + ivec3(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)));
+        const auto found = mask_of.find(cell_key(cell_of_key(keys[i]) + ivec3(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)));
         if (found != mask_of.end()) neighbours[static_cast<size_t>(n)] = found->second;
       }
       masks[i] = widen_brick(neighbours, reach);
@@ -175,7 +152,7 @@ VoxelSet widen(const VoxelSet& set, double reach) {
   VoxelSet result;
   for (size_t i = 0; i < keys.size(); ++i) {
     if (masks[i] == VoxelMask{}) continue;
-    result.coordinates.push_back(brick_of_key(keys[i]));
+    result.coordinates.push_back(cell_of_key(keys[i]));
     result.masks.push_back(masks[i]);
   }
   return result;

@@ -9,6 +9,7 @@
 #include "base/hash.h"
 #include "base/vec.h"
 #include "cache/level.h"
+#include "prefilter/grid_cells.h"
 #include "prefilter/surface.h"
 
 namespace farfield {
@@ -20,11 +21,14 @@ struct VoxelLattice {
   double voxel_size = 0;  ///< > 0, scene units
 };
 
-/// Voxels must be less than this far from the lattice's origin, in voxels.
-inline constexpr int kVoxelLimit = 1 << 20;
-
 /// 8^3 voxels: bit x + 8 y of word z.
 using VoxelMask = std::array<uint64_t, 8>;
+
+/// Whether the set has the brick's voxel i, as bricks number them (cache/level.h).
+inline bool is_set(const VoxelMask& mask, int i) { return mask[static_cast<size_t>(i >> 6)] >> (i & 63) & 1; }
+
+/// The coordinate of voxel i of a brick.
+inline ivec3 voxel_of_brick(const ivec3& brick, int i) { return brick * kBrickSide + ivec3(i & 7, i >> 3 & 7, i >> 6); }
 
 inline size_t voxel_count(const VoxelMask& mask) {
   size_t count = 0;
@@ -47,7 +51,7 @@ struct VoxelSet {
 };
 
 /// All voxels that triangles pass through, and some that they pass by within a voxel. All geometry must lie within
-/// kVoxelLimit - 64 voxels of the origin. Deterministic for any thread count.
+/// kCellLimit - 64 voxels of the origin. Deterministic for any thread count.
 VoxelSet mark_voxels(const Surface& geometry, const VoxelLattice& lattice);
 
 /// The largest reach of widen().

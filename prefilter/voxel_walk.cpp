@@ -10,8 +10,8 @@ VoxelBox bounds_of_voxels(const SparseVolume& volume) {
   ivec3 lower(std::numeric_limits<int>::max()), upper(std::numeric_limits<int>::min());
   for (const VoxelBrick& brick : volume.bricks) {
     for (int i = 0; i < kBrickVoxels; ++i) {
-      if (!(brick.mask[static_cast<size_t>(i >> 6)] >> (i & 63) & 1)) continue;
-      const ivec3 voxel = brick.coordinate * kBrickSide + ivec3(i & 7, i >> 3 & 7, i >> 6);
+      if (!is_set(brick.mask, i)) continue;
+      const ivec3 voxel = voxel_of_brick(brick.coordinate, i);
       lower = glm::min(lower, voxel);
       upper = glm::max(upper, voxel + 1);
     }

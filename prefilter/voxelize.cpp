@@ -150,7 +150,7 @@ std::vector<Voxel> measure_brick(const Measurement& m, const ivec3& brick, Voxel
     const auto word = static_cast<size_t>(i >> 6);
     const uint64_t bit = uint64_t{1} << (i & 63);
     if (!(mask[word] & bit)) continue;
-    const ivec3 coordinate = brick * kBrickSide + ivec3(i & 7, i >> 3 & 7, i >> 6);
+    const ivec3 coordinate = voxel_of_brick(brick, i);
     const Voxel voxel = measure_voxel(m, coordinate);
     if (voxel.density > 0) {
       voxels.push_back(voxel);
@@ -171,10 +171,10 @@ Result<void> check_arguments(const Surface& geometry, const VoxelLattice& lattic
   const Box3 bounds = geometry.bounds();
   const dvec3 furthest =
       glm::max(glm::abs(dvec3(bounds.lower) - lattice.origin), glm::abs(dvec3(bounds.upper) - lattice.origin));
-  if (!(std::max({furthest.x, furthest.y, furthest.z}) < (kVoxelLimit - 64) * lattice.voxel_size)) {
+  if (!(std::max({furthest.x, furthest.y, furthest.z}) < (kCellLimit - 64) * lattice.voxel_size)) {
     return make_error(ErrorCode::InvalidArgument,
                       fmt::format("voxelize: geometry reaches further than {} voxels of {} from the lattice's origin",
-                                  kVoxelLimit - 64, lattice.voxel_size));
+                                  kCellLimit - 64, lattice.voxel_size));
   }
   return {};
 }

@@ -37,8 +37,7 @@ class VoxelLookup {
   }
   bool contains(const ivec3& v) const {
     const auto found = mask_of_.find(cell_key({v.x >> 3, v.y >> 3, v.z >> 3}));
-    return found != mask_of_.end() &&
-           ((*found->second)[static_cast<size_t>(v.z & 7)] >> ((v.x & 7) + 8 * (v.y & 7)) & 1);
+    return found != mask_of_.end() && is_set(*found->second, (v.x & 7) + 8 * (v.y & 7) + 64 * (v.z & 7));
   }
 
  private:
@@ -52,8 +51,8 @@ class Boundary {
     const VoxelLookup lookup(set);
     for (size_t b = 0; b < set.coordinates.size(); ++b) {
       for (int i = 0; i < kBrickVoxels; ++i) {
-        if (!(set.masks[b][static_cast<size_t>(i >> 6)] >> (i & 63) & 1)) continue;
-        const ivec3 voxel = set.coordinates[b] * kBrickSide + ivec3(i & 7, i >> 3 & 7, i >> 6);
+        if (!is_set(set.masks[b], i)) continue;
+        const ivec3 voxel = voxel_of_brick(set.coordinates[b], i);
         for (int axis = 0; axis < 3; ++axis) {
           for (const int side : {0, 1}) {
             ivec3 neighbour = voxel;
@@ -91,11 +90,9 @@ class NearestPoint {
  public:
   NearestPoint(const Surface& wall, const VoxelLattice& lattice) {
     for (size_t face = 0; face < wall.triangles.size(); ++face) {
-      TrianglePiece t = corners_of(wall, face);
-      for (dvec3& p : t) p = (p - lattice.origin) / lattice.voxel_size;
-      for_each_piece(t, 1, [&](const TrianglePiece& piece) {
-        pieces_[cell_key(ivec3(glm::floor(middle_of(piece))))].push_back(piece);
-      });
+      for_each_piece(
+          in_cells(corners_of(wall, face), lattice.origin, lattice.voxel_size), 1,
+          [&](const TrianglePiece& piece) { pieces_[cell_key(ivec3(glm::floor(middle_of(piece))))].push_back(piece); });
     }
     for_each_cell_around(ivec3(0), kReach, [&](const ivec3& offset) {
       around_.push_back({offset, distance_to_voxel(offset)});
@@ -211,9 +208,8 @@ class WallViewer {
 
  private:
   void look(const TrianglePiece& face, const vec3& outwards, SplitMix& random, Seen& seen) const {
-    const float root = std::sqrt(static_cast<float>(random.next_unit())),
-                along = static_cast<float>(random.next_unit());
-    const vec3 at = vec3(face[0]) * (1 - root) + vec3(face[1]) * (root * (1 - along)) + vec3(face[2]) * (root * along);
+    const auto u = static_cast<float>(random.next_unit()), v = static_cast<float>(random.next_unit());
+    const vec3 at = point_on(face, u, v);
     const vec3 away = lobe(outwards, random);
     const float start = 0.5f * resolution_ / std::max(glm::dot(away, outwards), kLeastCosine);
     seen.rays += 1;

@@ -11,6 +11,7 @@
 #include "base/hash.h"
 #include "base/parallel.h"
 #include "base/split_mix.h"
+#include "prefilter/grid_cells.h"
 #include "prefilter/ray_scene.h"
 #include "prefilter/triangle_pieces.h"
 #include "scattering/sggx.h"
@@ -87,14 +88,12 @@ std::optional<Layer> thin_layer(const Moments& moments) {
   return Layer{moments.middle(), *normal};
 }
 
-TrianglePiece scaled(const TrianglePiece& t, double unit) { return {t[0] / unit, t[1] / unit, t[2] / unit}; }
-
 /// Moments of the geometry per cell.
 class MomentGrid {
  public:
   MomentGrid(const Surface& geometry, double resolution) {
     for (size_t face = 0; face < geometry.triangles.size(); ++face) {
-      for_each_piece(scaled(corners_of(geometry, face), resolution), 1, [&](const TrianglePiece& piece) {
+      for_each_piece(in_cells(corners_of(geometry, face), dvec3(0.0), resolution), 1, [&](const TrianglePiece& piece) {
         const ivec3 cell(glm::floor(middle_of(piece)));
         const auto [place, is_new] = cell_of_.try_emplace(cell_key(cell), static_cast<uint32_t>(cells_.size()));
         if (is_new) cells_.push_back({cell, {}});
@@ -184,7 +183,7 @@ std::vector<uint8_t> faces_mostly_in(const Surface& geometry, double unit, const
   parallel_for(result.size(), 1024, [&](size_t begin, size_t end) {
     for (size_t f = begin; f < end; ++f) {
       double all = 0, inside = 0;
-      for_each_piece(scaled(corners_of(geometry, f), unit), 1, [&](const TrianglePiece& piece) {
+      for_each_piece(in_cells(corners_of(geometry, f), dvec3(0.0), unit), 1, [&](const TrianglePiece& piece) {
         const double area = glm::length(area_vector_of(piece));
         all += area;
         if (is_in(middle_of(piece))) inside += area;
@@ -226,7 +225,7 @@ std::vector<uint8_t> find_near(const Surface& geometry, const Surface& surface, 
   std::unordered_set<uint64_t> near;
   for (size_t f = 0; f < surface.triangles.size(); ++f) {
     if (!is_marked[f]) continue;
-    for_each_piece(scaled(corners_of(surface, f), distance), 1, [&](const TrianglePiece& piece) {
+    for_each_piece(in_cells(corners_of(surface, f), dvec3(0.0), distance), 1, [&](const TrianglePiece& piece) {
       for_each_cell_around(ivec3(glm::floor(middle_of(piece))), 1,
                            [&](const ivec3& cell) { near.insert(cell_key(cell)); });
     });

@@ -3,10 +3,10 @@
 // way is free; light from the other side meets the clump that the viewer sees the front of. A medium does not know.
 // With the phase angle between wo and wi, and m the scatterer's normal, a Lambertian lobe is multiplied by
 //
-//   1 + strength (L(wo.wi) - mean of L over the lobe),   L(c) = -ln((1 - c + e) / (2 + e)) / 2, about -ln sin(angle /
-//   2)
+//   1 + strength (L(wo.wi) - mean of L over the lobe)
 //
-// so that as much light leaves in all, for each flake. L is what trees show (docs/decisions/0017); leaf optics has
+// with L(c) = -ln((1 - c + e) / (2 + e)) / 2, about -ln sin(angle / 2).
+// As much light leaves in all, for each flake. L is what trees show (docs/decisions/0017); leaf optics has
 // other forms, with one or two more parameters [Kuusk 1985].
 #pragma once
 

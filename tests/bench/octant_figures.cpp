@@ -49,9 +49,6 @@ Parts each_alone(SparseVolume volume) {
   return parts;
 }
 
-ivec3 voxel_of_brick(const ivec3& brick, int i) { return brick * kBrickSide + ivec3(i & 7, i >> 3 & 7, i >> 6); }
-bool is_set(const VoxelMask& mask, int i) { return mask[static_cast<size_t>(i >> 6)] >> (i & 63) & 1; }
-
 struct FileOrder {
   bool operator()(const ivec3& a, const ivec3& b) const { return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x); }
 };

@@ -23,6 +23,7 @@
 #include "prefilter/condition.h"
 #include "prefilter/material_filter.h"
 #include "prefilter/resolve.h"
+#include "prefilter/triangle_pieces.h"
 
 namespace farfield {
 namespace {
@@ -37,7 +38,7 @@ class VertexMesh {
   explicit VertexMesh(Surface surface) : surface_(std::move(surface)), materials_(surface_.positions.size()) {
     std::vector<float> area(surface_.positions.size());
     for (size_t f = 0; f < surface_.triangles.size(); ++f) {
-      const auto of_face = static_cast<float>(glm::length(area_vector(surface_.triangles[f])));
+      const auto of_face = static_cast<float>(glm::length(area_vector_of(corners_of(surface_, f))));
       for (int c = 0; c < 3; ++c) {
         const uint32_t v = surface_.triangles[f][c];
         area[v] += of_face;
@@ -66,7 +67,7 @@ class VertexMesh {
     result.origin = surface_.origin;
     for (size_t i = 0; i < kept.size(); i += 3) {
       const uvec3 face(kept[i], kept[i + 1], kept[i + 2]);
-      const dvec3 across = area_vector(face);
+      const dvec3 across = area_vector_of(corners_of(surface_, face));
       if (!(glm::length(across) > 0)) continue;
       result.triangles.push_back(face);
       result.materials.push_back(material_of(face, vec3(glm::normalize(across))));
@@ -75,11 +76,6 @@ class VertexMesh {
   }
 
  private:
-  dvec3 area_vector(const uvec3& face) const {
-    const dvec3 a(surface_.positions[face.x]), b(surface_.positions[face.y]), c(surface_.positions[face.z]);
-    return glm::cross(b - a, c - a);
-  }
-
   FaceMaterial material_of(const uvec3& face, const vec3& normal) const {
     const FaceMaterial two = mix(materials_[face.x], 0.5f, materials_[face.y], 0.5f);
     FaceMaterial material = mix(two, 2.0f / 3, materials_[face.z], 1.0f / 3);

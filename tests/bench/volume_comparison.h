@@ -15,6 +15,7 @@
 #include "base/split_mix.h"
 #include "evaluate/views.h"
 #include "prefilter/isotropic_lines.h"
+#include "prefilter/line_scene.h"
 #include "prefilter/ray_scene.h"
 #include "prefilter/voxel_walk.h"
 
@@ -38,9 +39,7 @@ struct Comparison {
     }
     VoxelRay ray{(dvec3(origin) - volume.lattice.origin) / size, dvec3(direction), 0, far / size};
     grid.walk(ray, [&](uint32_t v, double enter, double leave) {
-      const Voxel& voxel = volume.voxels[v];
-      visit(enter * size,
-            (leave - enter) * size * voxel.density * std::sqrt(std::max(0.0f, voxel.sggx.quadratic(direction))));
+      visit(enter * size, (leave - enter) * size * sigma_of(volume.voxels[v], direction));
       return true;
     });
     return wall;

@@ -49,8 +49,8 @@ class VolumeScene {
     for (const VoxelBrick& brick : volume.bricks) {
       uint64_t index = brick.first_voxel;
       for (int i = 0; i < kBrickVoxels; ++i) {
-        if (!(brick.mask[static_cast<size_t>(i >> 6)] >> (i & 63) & 1)) continue;
-        at(brick.coordinate * kBrickSide + ivec3(i & 7, i >> 3 & 7, i >> 6) - lower_) = &volume.voxels[index++];
+        if (!is_set(brick.mask, i)) continue;
+        at(voxel_of_brick(brick.coordinate, i) - lower_) = &volume.voxels[index++];
       }
     }
   }
