@@ -41,7 +41,8 @@ struct SparseVolume {
   VoxelLattice lattice;
   std::vector<VoxelBrick> bricks;  ///< none empty; sorted by z, then y, then x
   std::vector<Voxel> voxels;
-  float hot_spot = 0;  ///< of all voxels (scattering/hot_spot.h). Not measured by voxelize()
+  float hot_spot = 0;    ///< of all voxels (scattering/hot_spot.h). Not measured by voxelize()
+  vec3 open_side{0.0f};  ///< of all voxels (scattering/open_side.h). Not measured by voxelize()
 };
 
 /// Some of the bricks that may hold voxels, by their number in the order of SparseVolume::bricks. Ranges that follow

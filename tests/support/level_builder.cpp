@@ -248,6 +248,7 @@ LevelData full_level_of_version_3() {
 LevelData full_level_of_version_4() {
   LevelData level = full_level_of_version_3();
   level.voxel_octants = counted<PackedOctants>(5, 18);
+  level.header.open_side = {0.1f, -0.2f, 0.3f};
   return level;
 }
 

@@ -33,6 +33,7 @@ void expect_same(const LevelView& a, const LevelView& b) {
   EXPECT_EQ(a.header.brick_dims, b.header.brick_dims);
   EXPECT_EQ(a.header.volume_origin, b.header.volume_origin);
   EXPECT_EQ(a.header.hot_spot, b.header.hot_spot);
+  EXPECT_EQ(a.header.open_side, b.header.open_side);
   std::vector<std::span<const std::byte>> sections;
   for_each_section(a, [&](SectionId, const auto& array) { sections.push_back(std::as_bytes(array)); });
   size_t i = 0;
@@ -293,9 +294,11 @@ TEST(HostileLevelFile, HeaderAndTableFieldsAreChecked) {
        ErrorCode::Unsupported},
       {"the header says", [](auto& h, auto*) { h.file_bytes = kHuge; }},
       {"sections leaves the file", [](auto& h, auto*) { h.section_count = 0xffffffffu; }},
-      {"reserved bytes", [](auto& h, auto*) { h.reserved[35] = 1; }},
+      {"reserved bytes", [](auto& h, auto*) { h.reserved[23] = 1; }},
       {"the hot spot's strength is -0.1", [](auto& h, auto*) { h.hot_spot = -0.1f; }},
       {"the hot spot's strength is 0.71", [](auto& h, auto*) { h.hot_spot = 0.71f; }},
+      {"the open side is (0, 0.6, 0)", [](auto& h, auto*) { h.open_side = {0, 0.6f, 0}; }},
+      {"the open side is (nan, 0, 0)", [](auto& h, auto*) { h.open_side = {NAN, 0, 0}; }},
       {"the hot spot's strength is nan", [](auto& h, auto*) { h.hot_spot = NAN; }},
       {"the resolution is 0", [](auto& h, auto*) { h.resolution = 0; }},
       {"the resolution is nan", [](auto& h, auto*) { h.resolution = NAN; }},
