@@ -14,7 +14,7 @@ RuntimeOptions runtime_options(const RenderOptions& options) {
   RuntimeOptions runtime;
   runtime.budget_bytes = options.budget_bytes;
   runtime.blend = options.blend;
-  runtime.lod_scale = options.lod_scale;
+  runtime.pixel_error = options.pixel_error;
   if (options.full_detail) runtime.forced_lambda = 0.0f;
   runtime.messages = [message = options.message, warning = options.warning](Severity severity,
                                                                             const std::string& text) {
@@ -74,7 +74,9 @@ Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& li
   report.rays = traced.rays;
   report.invalid_samples = traced.invalid_samples;
   report.bias = plan.bias;
+  report.asked_bytes = plan.asked_bytes;
   report.finest_level = std::move(plan.finest_level);
+  report.levels_given_up = std::move(plan.levels_given_up);
   return report;
 }
 
