@@ -21,8 +21,8 @@ namespace {
 constexpr int kRays = 1 << 12;  // of each kind
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Least squares over the levels of three trees (docs/results/speed.md).
-constexpr double kRay = 120, kBox = 6, kQuad = 12, kBrick = 14, kVoxel = 6, kCollision = 60;
+// Least squares over the levels of five trees and two grounds (docs/results/speed.md); quads go with boxes.
+constexpr double kRay = 55, kBox = 6, kQuad = 1, kBrick = 21, kVoxel = 12.5, kCollision = 66;
 
 // What a flake shows on average over directions of its full area: one side of a flat one.
 constexpr float kMeanArea = 0.5f;
@@ -217,45 +217,98 @@ bool walk_cells(const vec3& origin, const vec3& direction, const Box3& box, cons
   return true;
 }
 
-/// A free flight until the optical depth is used up. Where it ends, or t_far.
-float free_flight(const LevelView& level, const vec3& origin, const vec3& direction, float t_far, float depth,
-                  RayWork& work) {
-  const LevelHeader& header = level.header;
-  if (!level.has_volume()) return t_far;
-  const float voxel = header.resolution, brick_side = voxel * kBrickSide;
-  const Box3 grid{header.volume_origin, header.volume_origin + vec3(header.brick_dims) * brick_side};
-  float t_end = t_far;
-  walk_cells(origin, direction, grid, header.brick_dims, brick_side, 0.0f, t_far,
-             [&](const ivec3& cell, float t_in, float t_out) {
-               work.bricks += 1;
-               const size_t at = static_cast<size_t>(cell.x) +
-                                 static_cast<size_t>(header.brick_dims.x) *
-                                     (static_cast<size_t>(cell.y) +
-                                      static_cast<size_t>(header.brick_dims.y) * static_cast<size_t>(cell.z));
-               if (level.brick_table[at] == kNoBrick) return true;
-               const Brick& brick = level.bricks[level.brick_table[at]];
-               const float expected = brick.density_scale * (t_out - t_in);
-               const bool is_faint = expected <= kFaint;
-               if (is_faint) work.collisions += static_cast<double>(expected);
-               const vec3 corner = grid.lower + brick_side * vec3(cell);
-               return walk_cells(origin, direction, {corner, corner + brick_side}, ivec3(kBrickSide), voxel, t_in,
-                                 t_out, [&](const ivec3& v, float t0, float t1) {
-                                   if (!is_faint) work.voxels += 1;
-                                   const int index = v.x + kBrickSide * (v.y + kBrickSide * v.z);
-                                   const float density = static_cast<float>(brick.density[static_cast<size_t>(index)]) *
-                                                         brick.density_scale / 255.0f;
-                                   const float crossed = kMeanArea * density * (t1 - t0);
-                                   if (crossed < depth) {
-                                     depth -= crossed;
-                                     return true;
-                                   }
-                                   if (!is_faint) work.collisions += 1 / static_cast<double>(kMeanArea);
-                                   t_end = t0 + depth / (kMeanArea * density);
-                                   return false;
-                                 });
-             });
-  return t_end;
+/// Attenuation of a voxel over flakes of no orientation and over its octants, as a share of its density's.
+float mean_share_of(const LevelView& level, const Brick& brick, int voxel) {
+  return kMeanArea * (level.voxel_octants.empty() ? 1.0f : mean_share(level.voxel_octants[brick.payload_index(voxel)]));
 }
+
+/// A level's volume as its rays see it: what is empty around it they do not walk.
+class Volume {
+ public:
+  explicit Volume(const LevelView& level) : level_(level) {
+    for (size_t i = 0; i < level.brick_table.size(); ++i) {
+      if (level.brick_table[i] == kNoBrick) continue;
+      const Brick& brick = level.bricks[level.brick_table[i]];
+      const Box3 voxels = active_box(brick);
+      const vec3 corner = level.header.volume_origin + brick_side() * vec3(brick_coordinates(level.header, i));
+      occupied_.extend(
+          Box3{corner + level.header.resolution * voxels.lower, corner + level.header.resolution * voxels.upper});
+      densest_scale_ = std::max(densest_scale_, brick.density_scale);
+    }
+  }
+  const LevelView& level() const { return level_; }
+  float brick_side() const { return level_.header.resolution * kBrickSide; }
+  const Box3& occupied() const { return occupied_; }
+  float densest_scale() const { return densest_scale_; }
+
+ private:
+  const LevelView& level_;
+  Box3 occupied_;
+  float densest_scale_ = 0;
+};
+
+/// One ray through a volume.
+class FreeFlight {
+ public:
+  FreeFlight(const Volume& volume, const vec3& origin, const vec3& direction, float depth, RayWork& work)
+      : volume_(volume), origin_(origin), direction_(direction), depth_(depth), work_(work) {}
+
+  /// Flies until the optical depth is used up. Where it ends, or t_far.
+  float end(float t_far) {
+    const LevelHeader& header = volume_.level().header;
+    end_ = t_far;
+    if (volume_.occupied().is_empty()) return end_;
+    const RayRange range = clip_to_box({origin_, direction_, 0.0f, t_far}, volume_.occupied());
+    if (range.is_empty() || volume_.densest_scale() * (range.t_far - range.t_near) < depth_) return end_;
+    const float side = volume_.brick_side();
+    const Box3 grid{header.volume_origin, header.volume_origin + vec3(header.brick_dims) * side};
+    walk_cells(origin_, direction_, grid, header.brick_dims, side, range.t_near, range.t_far,
+               [&](const ivec3& cell, float enter, float leave) { return cross_cell(cell, enter, leave); });
+    return end_;
+  }
+
+ private:
+  /// A cell of the brick table. False: the flight ends there.
+  bool cross_cell(const ivec3& cell, float enter, float leave) {
+    const LevelView& level = volume_.level();
+    const ivec3& dims = level.header.brick_dims;
+    work_.bricks += 1;
+    const size_t row = static_cast<size_t>(cell.y) + static_cast<size_t>(dims.y) * static_cast<size_t>(cell.z);
+    const uint32_t index = level.brick_table[static_cast<size_t>(cell.x) + static_cast<size_t>(dims.x) * row];
+    if (index == kNoBrick) return true;
+    const Brick& brick = level.bricks[index];
+    const float expected = brick.density_scale * (leave - enter);
+    const bool is_faint = expected <= kFaint;
+    if (is_faint) work_.collisions += static_cast<double>(expected);
+    const vec3 corner = level.header.volume_origin + volume_.brick_side() * vec3(cell);
+    return walk_cells(origin_, direction_, {corner, corner + volume_.brick_side()}, ivec3(kBrickSide),
+                      level.header.resolution, enter, leave, [&](const ivec3& voxel, float from, float to) {
+                        if (!is_faint) work_.voxels += 1;
+                        return cross_voxel(brick, voxel, from, to, is_faint);
+                      });
+  }
+
+  bool cross_voxel(const Brick& brick, const ivec3& voxel, float enter, float leave, bool is_faint) {
+    const int i = voxel.x + kBrickSide * (voxel.y + kBrickSide * voxel.z);
+    const uint8_t density = brick.density[static_cast<size_t>(i)];
+    if (density == 0) return true;
+    const float share = mean_share_of(volume_.level(), brick, i);
+    const float rate = share * static_cast<float>(density) * brick.density_scale / 255.0f;
+    if (!is_faint) work_.collisions += static_cast<double>(std::min(depth_, rate * (leave - enter)) / share);
+    if (rate * (leave - enter) < depth_) {
+      depth_ -= rate * (leave - enter);
+      return true;
+    }
+    end_ = enter + depth_ / rate;
+    return false;
+  }
+
+  const Volume& volume_;
+  vec3 origin_, direction_;
+  float depth_;  // optical, left
+  float end_ = 0;
+  RayWork& work_;
+};
 
 // ---- rays ----
 
@@ -271,6 +324,7 @@ RayWork count_ray_work(const LevelView& level) {
   const Box3& bounds = level.header.bounds;
   if (bounds.is_empty()) return work;
   const QuadTree surface(level);
+  const Volume volume(level);
   const float size = glm::length(bounds.size());
   Rng rng(1);
   int rays = 0;
@@ -278,8 +332,9 @@ RayWork count_ray_work(const LevelView& level) {
   const auto trace = [&](const vec3& origin, const vec3& direction, float depth) {
     ++rays;
     const float t = surface.nearest_hit(origin, direction, kInfinity, work);
-    const float end = free_flight(level, origin, direction, std::min(t, 4 * size), depth, work);
-    return end < std::min(t, 4 * size) ? end : t;
+    const float far = std::min(t, 4 * size);
+    const float end = FreeFlight(volume, origin, direction, depth, work).end(far);
+    return end < far ? end : t;
   };
   for (int i = 0; i < kRays; ++i) {
     const vec3 through = bounds.lower + bounds.size() * vec3(rng.next(), rng.next(), rng.next());

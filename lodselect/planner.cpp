@@ -305,7 +305,7 @@ class SpeedUp {
     for (std::vector<uint8_t>& levels : usable_) std::sort(levels.begin(), levels.end());
   }
 
-  std::vector<std::vector<uint8_t>>& usable() { return usable_; }
+  const std::vector<std::vector<uint8_t>>& usable() const { return usable_; }
   Bytes resident() const { return resident_; }
   /// Of the largest build among what is usable now.
   uint64_t peak() const {
@@ -400,7 +400,7 @@ Result<Plan> plan_levels(std::span<const PlanAsset> assets, uint64_t budget_byte
   speed_up.coarsen_for_speed();
 
   Plan plan;
-  plan.usable = std::move(speed_up.usable());
+  plan.usable = speed_up.usable();
   plan.resident_bytes = saturated(speed_up.resident());
   plan.build_peak_bytes = speed_up.peak();
   plan.asked_bytes = saturated(asked.resident + asked.peak + fixed_bytes);

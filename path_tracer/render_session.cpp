@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "path_tracer/render_session.h"
 
+#include <malloc.h>
+
 #include <chrono>
 
 #include "base/process_memory.h"
@@ -59,6 +61,7 @@ Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& li
   runtime_->set_cameras({camera.tessellation()});
   FARFIELD_TRY_LET(auto plan, runtime_->plan_frame());
   runtime_->prefetch();
+  malloc_trim(0);  // what writing the last frame left in the heap is not the assets'
 
   const TraceScene scene{scene_.get(), runtime_.get(), &lights, &ids_};
   FARFIELD_TRY_LET(const auto traced, path_trace(scene, camera, options.trace, film, job));
