@@ -149,10 +149,14 @@ class Choice {
     }
     return levels;
   }
-  /// The level that serves what is asked at the least cost: the asked one, or a finer one that costs rays less.
-  uint8_t cheapest_asked() const {
+  /// The level that serves what is asked: the asked one, or a finer one in which rays cost a fifth less. That is about
+  /// what the count is right to, and what bytes are worth giving for.
+  uint8_t best_for_asked() const {
+    constexpr float kWorthwhile = 0.8f;
     const std::vector<uint8_t> levels = cheaper_from(0);
-    return *std::prev(std::upper_bound(levels.begin(), levels.end(), asked_));
+    const uint8_t level = *std::prev(std::upper_bound(levels.begin(), levels.end(), asked_));
+    if (level == asked_ || asset_.ray_cost.empty()) return asked_;
+    return asset_.ray_cost[level] < kWorthwhile * asset_.ray_cost[asked_] ? level : asked_;
   }
   /// Pixels of the instances that use a level, not the finest, if the next coarser usable one is `next`; of those that
   /// see it blended with a finer one, too.
@@ -279,11 +283,11 @@ class SpeedUp {
   SpeedUp(std::span<const Choice> choices, const Draft& draft, Bytes budget)
       : choices_(choices), finest_(draft.finest), resident_(draft.resident), peak_(draft.peak), budget_(budget) {}
 
-  /// A finer level than asked where rays cost less in it.
+  /// A finer level than asked where rays cost clearly less in it.
   void refine_for_speed() {
     std::vector<Extra> extras;
     for (size_t i = 0; i < choices_.size(); ++i) {
-      const uint8_t level = choices_[i].cheapest_asked();
+      const uint8_t level = choices_[i].best_for_asked();
       if (finest_[i] <= choices_[i].asked() && level < finest_[i]) add(extras, i, level, choices_[i].pixels(), true);
     }
     take_what_fits(extras);

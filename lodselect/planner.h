@@ -50,8 +50,8 @@ struct Plan {
 /// Chooses each asset's levels, in this order:
 ///   1. the finest level that each asset needs, so that the projected error is small while resident + peak + fixed
 ///      bytes fit the budget; the root is always there;
-///   2. where room is left, a level that costs rays less: a finer one than asked, or coarser ones for instances that
-///      ask for no more. A level that costs rays more than a finer usable one is left out.
+///   2. where room is left, what costs rays less: a finer level than asked, if by a fifth, and coarser ones for
+///      instances that ask for no more. A level that costs rays more than a finer usable one is left out.
 /// More budget never gives a larger error. Errors: OutOfBudget if the roots alone do not fit; the message has the
 /// number of bytes that would. InvalidArgument: lists of different lengths, more than 256 levels, numbers not sorted.
 Result<Plan> plan_levels(std::span<const PlanAsset> assets, uint64_t budget_bytes, uint64_t fixed_bytes);

@@ -57,7 +57,7 @@ TEST(RayCost, VoxelsAreCountedUntilTheRayIsStopped) {
 TEST(RayCost, FaintBricksAreNotWalkedVoxelByVoxel) {
   const RayWork faint = work_of(cube_of(0.1f));
   EXPECT_EQ(faint.voxels, 0.0);
-  EXPECT_GT(faint.bricks, 2.0);
+  EXPECT_GT(faint.bricks, 0.5);  // only by those who could collide
   EXPECT_LT(faint.collisions, 0.5);
   EXPECT_GT(faint.collisions, 0.05);
 }

@@ -314,7 +314,9 @@ TEST(PlanLevels, LeavesOutWhatIsDearerThanAFinerLevel) {
 
 TEST(PlanLevels, TakesACheaperFinerLevelOnlyWhereThereIsRoom) {
   PlanAsset asset = asset_of({1000, 300, 100, 10}, 2.0f);
-  asset.ray_cost = {50, 90, 60, 10};
+  asset.ray_cost = {50, 90, 60, 10};  // not by a fifth
+  EXPECT_EQ(usable(asset, kUnlimited), (std::vector<uint8_t>{2, 3}));
+  asset.ray_cost = {50, 90, 70, 10};
   EXPECT_EQ(usable(asset, 1010), (std::vector<uint8_t>{0, 3}));
   EXPECT_EQ(usable(asset, 1009), (std::vector<uint8_t>{2, 3}));
   EXPECT_EQ(plan_levels(std::span(&asset, 1), 1009, 0)->asked_bytes, 110u);
