@@ -27,6 +27,7 @@
 #include "base/index.h"
 #include "base/result.h"
 #include "bvh/level_scene.h"
+#include "bvh/ray_cost.h"
 #include "cache/level_file.h"
 #include "prefilter/face_materials.h"
 #include "prefilter/macrosurface.h"
@@ -467,6 +468,7 @@ class Baker {
     entry.bricks = level.bricks.size();
     entry.resident_bytes = cost.resident_bytes;
     entry.build_peak_bytes = cost.build_peak_bytes;
+    entry.ray_cost = ray_cost(view);
     const fs::path path = workspace_.asset_dir() / entry.file;
     FARFIELD_TRY_LET(const auto bytes, write_level(path, level));
     entry.file_bytes = bytes;
