@@ -427,7 +427,7 @@ void fill_small_islands(const Surface& surface, const EdgeTable& edges, double r
 
 }  // namespace
 
-std::vector<uint8_t> classify_macrosurface(const Surface& surface, float resolution) {
+std::vector<uint8_t> classify_macrosurface(const Surface& surface, float resolution, const Job& job) {
   if (!(resolution > 0)) return std::vector<uint8_t>(surface.triangles.size(), 1);
   const EdgeTable edges = build_edge_table(surface.triangles, surface.positions.size());
   const Patches patches = make_patches(surface, edges, kPatchRadius * resolution);
@@ -437,13 +437,16 @@ std::vector<uint8_t> classify_macrosurface(const Surface& surface, float resolut
   const size_t grain = std::max<size_t>(256, patches.seeds.size() / 64);  // an explorer has room for each face
   parallel_for(patches.seeds.size(), grain, [&](size_t begin, size_t end) {
     BallExplorer explorer(surface, edges, blocks, resolution);
-    for (size_t i = begin; i < end; ++i) patch_is_macrosurface[i] = explorer.is_on_macrosurface(patches.seeds[i]);
+    for (size_t i = begin; i < end && !job.is_cancelled(); ++i) {
+      patch_is_macrosurface[i] = explorer.is_on_macrosurface(patches.seeds[i]);
+    }
   });
 
   std::vector<uint8_t> is_macrosurface(surface.triangles.size());
   for (size_t face = 0; face < is_macrosurface.size(); ++face) {
     is_macrosurface[face] = patch_is_macrosurface[patches.patch_of_face[face]];
   }
+  if (job.is_cancelled()) return is_macrosurface;
   drop_small_pieces(surface, edges, resolution, is_macrosurface);
   fill_small_islands(surface, edges, resolution, is_macrosurface);
   return is_macrosurface;
