@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/vec.h"
+#include "cache/octants.h"
 #include "scattering/sggx_codec.h"
 
 namespace farfield {
@@ -157,7 +158,9 @@ inline ivec3 brick_coordinates(const LevelHeader& header, uint64_t table_index) 
   ARRAY(26, ShadingUv,          shading_uv,           vec2,              ShadingVertices) /* v down; none */         \
   ARRAY(27, ShadingColor,       shading_color,        PackedVertexColor, ShadingVertices) /* white */                 \
   /* walls made of pieces */                                                                                          \
-  ARRAY(28, FaceGap,            face_gap,             uint8_t,           Faces)         /* unorm8; 0 */
+  ARRAY(28, FaceGap,            face_gap,             uint8_t,           Faces)         /* unorm8; 0 */               \
+  /* shapes inside voxels */                                                                                          \
+  ARRAY(29, VoxelOctants,       voxel_octants,        PackedOctants,     Voxels)        /* shares of density; full */
 // clang-format on
 
 /// The arrays, owned (Array = std::vector<T>) while baking, or as spans into a mapped file at run time.

@@ -38,9 +38,10 @@ vec3 to_vec3(const std::array<float, 3>& stored) { return {stored[0], stored[1],
 
 /// The first version that has what a level needs, so that older readers read what they can.
 uint32_t version_of(const LevelHeader& level, std::span<const SectionEntry> table) {
-  constexpr uint32_t kLastOfVersion1 = 18, kLastOfVersion2 = 27;
+  constexpr uint32_t kLastOfVersion1 = 18, kLastOfVersion2 = 27, kLastOfVersion3 = 28;
   const uint32_t last_section = table.empty() ? 0 : table.back().id;
-  if (level.hot_spot != 0 || last_section > kLastOfVersion2) return kLevelFileVersion;
+  if (last_section > kLastOfVersion3) return kLevelFileVersion;
+  if (level.hot_spot != 0 || last_section > kLastOfVersion2) return 3;
   return last_section <= kLastOfVersion1 ? 1 : 2;
 }
 

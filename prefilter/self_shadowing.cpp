@@ -69,11 +69,8 @@ std::optional<Collision> first_collision(const SparseVolume& volume, const LineS
                                          SplitMix& random) {
   double left = -std::log1p(-random.next_unit());
   std::optional<Collision> found;
-  const vec3 direction(line.ray.direction);
-  scene.grid().walk(line.ray, [&](uint32_t number, double enter, double leave) {
-    const double rate = volume.lattice.voxel_size * sigma_of(volume.voxels[number], direction);
-    const double depth = rate * (leave - enter);
-    if (depth > left) found = {number, enter + left / rate};
+  walk_octant_depths(volume, scene.grid(), line.ray, [&](const OctantStretch& at, double depth) {
+    if (depth > left) found = {at.voxel, at.enter + left / depth * (at.leave - at.enter)};
     left -= depth;
     return !found;
   });

@@ -19,7 +19,8 @@ namespace farfield {
 /// A voxel's microflakes, in full precision.
 struct Voxel {
   float density = 0;  ///< rho_g > 0, in 1 / scene unit: the attenuation along the axis of the largest eigenvalue
-  SymMat3 sggx;       ///< scaled to lambda_max = 1
+  PackedOctants octants = kFullOctants;  ///< where in the voxel that is so. Not measured by voxelize()
+  SymMat3 sggx;                          ///< scaled to lambda_max = 1
   vec3 diffuse{0.0f};
   vec3 specular{0.0f};
   vec3 transmission{0.0f};

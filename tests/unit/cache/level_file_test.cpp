@@ -144,6 +144,16 @@ TEST(LevelFormat, GoldenBytesOfVersion3AreFrozen) {
   expect_frozen("/format_v3/level_3.ffl", 4288u, test::full_level_of_version_3());
 }
 
+TEST(LevelFormat, GoldenBytesOfVersion4AreFrozen) {
+  expect_frozen("/format_v4/level_3.ffl", 4416u, test::full_level_of_version_4());
+}
+
+TEST(LevelFormat, OctantsMustBelongToVoxels) {
+  LevelData level = test::full_level_of_version_4();
+  level.voxel_octants.pop_back();
+  EXPECT_EQ(find_structure_problem(view_of(level)).value_or(""), "voxel_octants has 4 elements for 5 voxels");
+}
+
 TEST(LevelFormat, GapsMustBelongToFaces) {
   LevelData level = test::full_level_of_version_3();
   level.face_gap.pop_back();
@@ -279,7 +289,7 @@ TEST(HostileLevelFile, HeaderAndTableFieldsAreChecked) {
   const std::vector<Case> cases = {
       {"does not start as a level file", [](auto& h, auto*) { h.magic[1] = 'X'; }},
       {"the format version is 0", [](auto& h, auto*) { h.version = 0; }},
-      {"level format 4, and this Farfield reads up to 3", [](auto& h, auto*) { h.version = 4; },
+      {"level format 5, and this Farfield reads up to 4", [](auto& h, auto*) { h.version = 5; },
        ErrorCode::Unsupported},
       {"the header says", [](auto& h, auto*) { h.file_bytes = kHuge; }},
       {"sections leaves the file", [](auto& h, auto*) { h.section_count = 0xffffffffu; }},
