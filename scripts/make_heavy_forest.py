@@ -327,11 +327,10 @@ def hull(mesh, length, beam):
     for side in (1, -1):
         for row in range(rows):
             v = np.array([row + 0.02, row + 0.98]) / rows
-            corners = [skin(u[i], np.full(pieces, v[j]), o) * (1, 1, side) for o in (0.0, 0.06) for j in (0, 1)
-                       for i in (slice(0, -1), slice(1, None))]
-            mesh.boxes("plank", np.stack(corners, 1))
+            edges = [skin(u, np.full(pieces + 1, v[j]), out) * (1, 1, side) for j, out in ((0, 0.0), (0, 0.06), (1, 0.06), (1, 0.0))]
+            mesh.add("plank", np.stack(edges, 1).reshape(1, -1, 3), grid_faces(pieces + 1, 4, is_closed=True))
     boards = np.arange(-0.5 * beam, 0.5 * beam, 0.16)
-    reach = 0.48 * length * np.sqrt(np.clip(1 - np.abs(2 * boards / beam) ** 2, 0, 1))
+    reach = 0.48 * length * np.sqrt(np.clip(1 - np.abs(2 * boards / beam) ** 2, 0.01, 1))
     corners = [np.stack([sx * reach, np.full_like(boards, y), boards + dz], 1) for dz in (0.005, 0.155) for y in (1.2, 1.25)
                for sx in (-1, 1)]
     mesh.boxes("plank", np.stack(corners, 1))
@@ -378,7 +377,7 @@ SPECIES = {
 # Share of the instances, and how far apart they stand at least (metres).
 SHARES = {"oak": 0.008, "maple": 0.009, "birch": 0.01, "willow": 0.003, "poplar": 0.004, "spruce": 0.016, "pine": 0.01,
           "hazel": 0.05, "fern": 0.26, "grass": 0.63}
-TREES = ("oak", "maple", "birch", "willow", "poplar", "spruce", "pine")
+TALL = ("oak", "maple", "birch", "willow", "poplar", "spruce", "pine", "hazel")  # would stand in the camera's way
 SHIPS = {"brig": 3, "bark": 2}
 SQUARE_METRES_PER_INSTANCE = 1.8
 
@@ -417,26 +416,28 @@ def ground(half_size, scale):
 
 
 def lake():
-    turn = 2 * math.pi * np.arange(97) / 96
-    r = (LAKE["radius"] + 30.0) * np.array([0.0, 1.0])[:, None]
+    turn = 2 * math.pi * np.arange(96) / 96
+    r = LAKE["radius"] + 30.0
+    shore = np.stack([LAKE["x"] + r * np.cos(turn), LAKE["level"] + 0 * turn, LAKE["z"] + r * np.sin(turn)], 1)
     mesh = Mesh()
-    mesh.sheet("water", np.stack([LAKE["x"] + r * np.cos(turn), LAKE["level"] + 0 * r * turn, LAKE["z"] + r * np.sin(turn)], -1))
+    mesh.add("water", np.concatenate([[[LAKE["x"], LAKE["level"], LAKE["z"]]], shore])[None],
+             [(0, 1 + (i + 1) % 96, 1 + i) for i in range(96)])
     return mesh
 
 
 # ---------------------------------------------------------------------------------------------- where things stand
-def plant(rng, count, radius, path, is_tree):
-    """(count, 3) places, as evenly as darts on a jittered grid; free of the lake and of the camera's way."""
+def plant(rng, count, radius, path, is_tall):
+    """(count, 3) places anywhere but in the lake and in the camera's way."""
     places = np.zeros((0, 3))
     while len(places) < count:
         r, a = radius * np.sqrt(rng.uniform(0, 1, 2 * count)), rng.uniform(0, 2 * math.pi, 2 * count)
         x, z = r * np.cos(a), r * np.sin(a)
         free = np.hypot(x - LAKE["x"], z - LAKE["z"]) > LAKE["radius"] + 12
-        clear, tall = (4.0, 24.0) if is_tree else (0.8, 3.0)
+        clear, tall = (4.0, 24.0) if is_tall else (0.8, 3.0)
         for eye, _ in path:
             if eye[1] < tall:
                 free &= np.hypot(x - eye[0], z - eye[2]) > clear
-        if is_tree:  # the hero stands at the origin; the line of sight from the path's middle
+        if is_tall:  # the hero stands at the origin; the line of sight from the path's middle
             free &= np.hypot(x, z) > 6.0
             free &= ~((z > 0) & (np.hypot(x, z) < 90) & (np.abs(np.arctan2(x, z) - 0.35) < 0.12))
         x, z = x[free], z[free]
@@ -449,7 +450,7 @@ def places_of(species, count, rng, path, radius):
         turn = 2 * math.pi * (np.arange(SHIPS[species]) / SHIPS[species] + (0.13 if species == "bark" else 0.0))
         r = 0.6 * LAKE["radius"] if species == "brig" else 0.2 * LAKE["radius"]
         return np.stack([LAKE["x"] + r * np.cos(turn), LAKE["level"] + 0 * turn, LAKE["z"] + r * np.sin(turn)], 1)
-    return plant(rng, count, radius, path, species in TREES)
+    return plant(rng, count, radius, path, species in TALL)
 
 
 def instances(rng, places):
