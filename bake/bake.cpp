@@ -331,7 +331,8 @@ class Baker {
   Result<SurfaceOrder> simplify_surface(uint32_t level, double resolution, LevelReport& level_report) {
     options_.job.report(share_done(level, 0), fmt::format("level {}: analyse", level));
     const Stopwatch analysis;
-    auto is_macrosurface = classify_macrosurface(surface_, static_cast<float>(resolution));
+    auto is_macrosurface = classify_macrosurface(surface_, static_cast<float>(resolution), options_.job);
+    if (options_.job.is_cancelled()) return cancelled();
     unwrap_walls(resolution, is_macrosurface);
     SplitSurface parts = split(surface_, is_macrosurface, sub_resolution_);
     const size_t first_shell_face = parts.macrosurface.triangles.size();
@@ -343,7 +344,9 @@ class Baker {
 
     options_.job.report(share_done(level, 0.03), fmt::format("level {}: simplify", level));
     const Stopwatch simplification;
-    const SimplifyResult simplified = simplify(parts.macrosurface, {.resolution = static_cast<float>(resolution)});
+    const SimplifyResult simplified =
+        simplify(parts.macrosurface, {.resolution = static_cast<float>(resolution)}, options_.job);
+    if (options_.job.is_cancelled()) return cancelled();
     SurfaceOrder order = order_surface(simplified.surface);
     surface_ = reorder(simplified.surface, order);
     note_shell(first_shell_face, simplified, order);
