@@ -68,7 +68,8 @@ Result<void> check_options(const BakeOptions& options) {
 
 /// Equal text and source hash give equal bytes.
 std::string canonical_options(const BakeOptions& options) {
-  const std::string import = fmt::format("mesh={} condition={}", options.import.mesh, kConditionVersion);
+  const std::string node = options.import.node < 0 ? "" : fmt::format("node={} ", options.import.node);
+  const std::string import = fmt::format("mesh={} {}condition={}", options.import.mesh, node, kConditionVersion);
   if (options.source_only) return "source_only=1 " + import;
   return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} {} voxelize={}", options.finest_grid,
                      options.coarsest_grid, options.rays_per_voxel, import, kVoxelizeVersion);
@@ -530,6 +531,15 @@ class Baker {
   uint32_t last_level_ = 0;
 };
 
+BakeReport nothing_to_do(Manifest manifest, const Stopwatch& watch) {
+  BakeReport report;
+  report.warnings = manifest.warnings;
+  report.manifest = std::move(manifest);
+  report.up_to_date = true;
+  report.total_seconds = watch.seconds();
+  return report;
+}
+
 }  // namespace
 
 std::optional<Manifest> find_up_to_date(const fs::path& source, const fs::path& out, const BakeOptions& options) {
@@ -545,15 +555,13 @@ std::optional<Manifest> find_up_to_date(const fs::path& source, const fs::path& 
 Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeOptions& options) {
   FARFIELD_TRY(check_options(options));
   const Stopwatch watch;
-  if (auto manifest = find_up_to_date(source, out, options)) {
-    BakeReport report;
-    report.warnings = manifest->warnings;
-    report.manifest = std::move(*manifest);
-    report.up_to_date = true;
-    report.total_seconds = watch.seconds();
-    return report;
+  if (auto manifest = find_up_to_date(source, out, options)) return nothing_to_do(std::move(*manifest), watch);
+  // Before the import, which may take minutes.
+  FARFIELD_TRY(check_replaceable(out));
+  FARFIELD_TRY_LET(const bool has_waited, wait_for_other_bake(out, options.job));
+  if (has_waited) {
+    if (auto manifest = find_up_to_date(source, out, options)) return nothing_to_do(std::move(*manifest), watch);
   }
-  FARFIELD_TRY(check_replaceable(out));  // before the import, which may take minutes
   options.job.report(0, "import");
   auto imported = import_asset(source, options.import, options.job.quiet());
   std::vector<std::string>& warnings = imported ? imported->warnings : imported.error().warnings;
@@ -575,14 +583,16 @@ Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, con
   report.manifest = make_manifest(source_name, asset.source_hash, options);
   report.manifest.source_files = std::move(asset.source_files);
   report.manifest.warnings = std::move(asset.warnings);
-  if (auto manifest = read_manifest(out); !options.even_if_up_to_date && manifest &&
-                                          are_same_bake(*manifest, report.manifest) && is_whole(out, *manifest)) {
-    report.manifest = std::move(*manifest);
-    report.up_to_date = true;
-    report.total_seconds = watch.seconds();
-    return report;
+  const auto find_same = [&]() -> std::optional<Manifest> {
+    auto manifest = read_manifest(out);
+    const bool is_same = manifest && are_same_bake(*manifest, report.manifest) && is_whole(out, *manifest);
+    return is_same && !options.even_if_up_to_date ? std::optional(std::move(*manifest)) : std::nullopt;
+  };
+  if (auto manifest = find_same()) return nothing_to_do(std::move(*manifest), watch);
+  FARFIELD_TRY_LET(auto workspace, with_warnings(BakeWorkspace::open(out, options.job), report.warnings));
+  if (workspace.has_waited()) {
+    if (auto manifest = find_same()) return nothing_to_do(std::move(*manifest), watch);
   }
-  FARFIELD_TRY_LET(auto workspace, with_warnings(BakeWorkspace::open(out), report.warnings));
   const std::vector<std::string> warnings = report.warnings;
   Baker baker(options, std::move(asset.source), std::move(workspace), std::move(report));
   FARFIELD_TRY_LET(auto baked, with_warnings(baker.run(), warnings));

@@ -3,6 +3,7 @@
 //   volume_KEY.ffl   packed volumes; KEY is the hash of everything that the volume depends on, so no other check of
 //                    options or versions is needed to use one again
 //   asset/           the asset in the making; becomes OUT by a rename
+//   owner            who bakes here, for the messages of those who wait; means nothing without the lock on the folder
 #include "bake/bake_workspace.h"
 
 #include <fcntl.h>
@@ -14,13 +15,17 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
+#include <fstream>
 #include <set>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <thread>
 #include <utility>
 
+#include "base/file_io.h"
 #include "base/hash.h"
 #include "base/result.h"
 #include "cache/level_file.h"
@@ -30,6 +35,9 @@ namespace farfield {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::chrono::milliseconds kPollInterval{10};
+constexpr const char* kOwnerName = "owner";
 
 tl::unexpected<Error> io_error(const char* verb, const fs::path& path, const char* reason) {
   return make_error(ErrorCode::Io, fmt::format("{}: cannot {}: {}", path.string(), verb, reason));
@@ -86,24 +94,74 @@ bool is_same(int descriptor, const fs::path& path) {
          opened.st_ino == named.st_ino;
 }
 
-/// Makes a folder if it is not there, and opens and locks it. Returns its descriptor.
-Result<int> lock_folder(const fs::path& folder) {
+fs::path working_folder(const fs::path& out) {
+  fs::path folder = out;
+  folder += ".partial";
+  return folder;
+}
+
+/// One try to lock a folder: locked, held by another bake, or gone (removed by a bake that ended meanwhile: a lock on
+/// that one keeps nobody out). Errors: Io.
+enum class LockState { Locked, Held, Gone };
+struct LockTry {
+  LockState state;
+  std::optional<FileDescriptor> descriptor;  ///< if it is locked
+};
+Result<LockTry> try_to_lock(const fs::path& folder) {
+  FileDescriptor descriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (descriptor.get() < 0 && errno == ENOENT) return LockTry{LockState::Gone, {}};
+  if (descriptor.get() < 0) return io_error("open", folder, std::strerror(errno));
+  if (::flock(descriptor.get(), LOCK_EX | LOCK_NB) != 0) {
+    if (errno == EWOULDBLOCK) return LockTry{LockState::Held, {}};
+    return io_error("lock", folder, fmt::format("{}; bake to a file system that can", std::strerror(errno)).c_str());
+  }
+  if (!is_same(descriptor.get(), folder)) return LockTry{LockState::Gone, {}};
+  return LockTry{LockState::Locked, std::move(descriptor)};
+}
+
+/// "process 123 on render07", for those who wait.
+std::string this_process() {
+  char host[256] = "";
+  ::gethostname(host, sizeof host - 1);
+  return fmt::format("process {} on {}", ::getpid(), host);
+}
+
+/// What a bake wrote of itself into the folder that it holds.
+std::string owner_of(const fs::path& folder) {
+  const auto text = read_small_file(folder / kOwnerName, 1024);
+  return text && !text->empty() ? *text : "another bake";
+}
+
+/// Between two tries of a lock. Errors: Cancelled.
+Result<void> wait_a_little(const fs::path& folder, const Job& job) {
+  if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, "bake: cancelled");
+  job.report(0, fmt::format("wait for {}", owner_of(folder)));
+  std::this_thread::sleep_for(kPollInterval);
+  return {};
+}
+
+/// Nothing hangs on it: those who wait without it just do not hear for whom.
+void write_owner(const fs::path& folder) { std::ofstream(folder / kOwnerName) << this_process(); }
+
+struct LockedFolder {
+  FileDescriptor descriptor;
+  bool has_waited = false;
+};
+
+/// Makes a folder if it is not there, and opens and locks it, once all others have let it go.
+Result<LockedFolder> lock_folder(const fs::path& folder, const Job& job) {
+  bool has_waited = false;
   for (;;) {
     std::error_code error;
     fs::create_directories(folder, error);
     // It was there, and another bake removed it before its kind was looked at.
     if (error == std::errc::file_exists && !fs::exists(fs::symlink_status(folder))) continue;
     if (error) return io_error("create", folder, error);
-    const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (descriptor < 0 && errno != ENOENT) return io_error("open", folder, std::strerror(errno));
-    const bool is_locked = descriptor >= 0 && ::flock(descriptor, LOCK_EX | LOCK_NB) == 0;
-    if (is_locked && is_same(descriptor, folder)) return descriptor;
-    if (descriptor >= 0) ::close(descriptor);
-    if (descriptor >= 0 && !is_locked) {
-      return make_error(ErrorCode::InvalidArgument,
-                        fmt::format("{}: is in use by another bake of this asset; wait for it", folder.string()));
-    }
-    // Another bake ended and removed the folder meanwhile: a lock on that one keeps nobody out.
+    FARFIELD_TRY_LET(auto lock, try_to_lock(folder));
+    if (lock.state == LockState::Locked) return LockedFolder{std::move(*lock.descriptor), has_waited};
+    if (lock.state == LockState::Gone) continue;
+    has_waited = true;
+    FARFIELD_TRY(wait_a_little(folder, job));
   }
 }
 
@@ -148,27 +206,39 @@ Result<void> check_replaceable(const fs::path& out) {
   return {};
 }
 
-BakeWorkspace::BakeWorkspace(fs::path out, fs::path folder, int lock)
-    : out_(std::move(out)), folder_(std::move(folder)), lock_(lock) {}
-
-BakeWorkspace::BakeWorkspace(BakeWorkspace&& other) noexcept
-    : out_(std::move(other.out_)), folder_(std::move(other.folder_)), lock_(std::exchange(other.lock_, -1)) {}
-
-BakeWorkspace::~BakeWorkspace() {
-  if (lock_ < 0) return;
-  std::error_code ignored;
-  fs::remove_all(asset_dir(), ignored);
-  fs::remove(folder_, ignored);  // only if no volume is in it
-  ::close(lock_);
+Result<bool> wait_for_other_bake(const fs::path& out, const Job& job) {
+  const fs::path folder = working_folder(without_trailing_slash(out));
+  for (bool has_waited = false;; has_waited = true) {
+    FARFIELD_TRY_LET(const auto lock, try_to_lock(folder));
+    if (lock.state != LockState::Held) return has_waited;
+    FARFIELD_TRY(wait_a_little(folder, job));
+  }
 }
 
-Result<BakeWorkspace> BakeWorkspace::open(const fs::path& out_path) {
+BakeWorkspace::BakeWorkspace(fs::path out, fs::path folder, FileDescriptor lock, bool has_waited)
+    : out_(std::move(out)), folder_(std::move(folder)), has_waited_(has_waited), lock_(std::move(lock)) {}
+
+BakeWorkspace::BakeWorkspace(BakeWorkspace&& other) noexcept
+    : out_(std::move(other.out_)),
+      folder_(std::move(other.folder_)),
+      has_waited_(other.has_waited_),
+      lock_(std::exchange(other.lock_, std::nullopt)) {}
+
+BakeWorkspace::~BakeWorkspace() {
+  if (!lock_) return;
+  std::error_code ignored;
+  fs::remove_all(asset_dir(), ignored);
+  fs::remove(folder_ / kOwnerName, ignored);
+  fs::remove(folder_, ignored);  // only if no volume is in it
+}
+
+Result<BakeWorkspace> BakeWorkspace::open(const fs::path& out_path, const Job& job) {
   const fs::path out = without_trailing_slash(out_path);
   FARFIELD_TRY(check_replaceable(out));
-  fs::path folder = out;
-  folder += ".partial";
-  FARFIELD_TRY_LET(const auto lock, lock_folder(folder));
-  BakeWorkspace workspace(out, folder, lock);
+  const fs::path folder = working_folder(out);
+  FARFIELD_TRY_LET(auto lock, lock_folder(folder, job));
+  BakeWorkspace workspace(out, folder, std::move(lock.descriptor), lock.has_waited);
+  write_owner(folder);
   std::error_code error;
   fs::remove_all(workspace.asset_dir(), error);  // of an interrupted bake
   if (!error) fs::create_directory(workspace.asset_dir(), error);
@@ -195,8 +265,7 @@ Result<void> BakeWorkspace::publish() {
       fs::exists(out_, error) ? exchange(asset_dir(), out_, aside) : ::rename(asset_dir().c_str(), out_.c_str());
   if (renamed != 0) return io_error("move the finished asset here", out_, std::strerror(errno));
   fs::remove_all(folder_, error);  // what is left is waste; that it could not be removed spoils nothing
-  ::close(lock_);
-  lock_ = -1;
+  lock_.reset();
   return {};
 }
 

@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <optional>
 
+#include "base/file_io.h"
+#include "base/job.h"
 #include "base/result.h"
 #include "cache/level.h"
 
@@ -16,16 +18,23 @@ namespace farfield {
 /// files in it. Errors: InvalidArgument (naming what does not belong), Io.
 Result<void> check_replaceable(const std::filesystem::path& out);
 
+/// Waits while another bake of OUT is running, in this process or another; `job` tells whose it is. True if there was
+/// one. The lock is the system's and goes with the process that holds it: none is ever stale. Errors: Cancelled, Io.
+Result<bool> wait_for_other_bake(const std::filesystem::path& out, const Job& job);
+
 /// The working folder of one bake; locked, so that two bakes of one asset do not mix. When it goes without publish(),
 /// it keeps the stored volumes and removes the rest. One thread at a time.
 class BakeWorkspace {
  public:
-  /// Creates or finds OUT.partial. Errors: those of check_replaceable(OUT), InvalidArgument (another bake of it is
-  /// running), Io.
-  static Result<BakeWorkspace> open(const std::filesystem::path& out);
+  /// Creates or finds OUT.partial, and waits until no other bake uses it. Errors: those of check_replaceable(OUT),
+  /// Cancelled, Io.
+  static Result<BakeWorkspace> open(const std::filesystem::path& out, const Job& job = {});
   BakeWorkspace(BakeWorkspace&& other) noexcept;
   BakeWorkspace& operator=(BakeWorkspace&&) = delete;
   ~BakeWorkspace();
+
+  /// Another bake held it first: OUT may be what was wanted by now.
+  bool has_waited() const { return has_waited_; }
 
   /// Where the asset's files are to be written; empty at first.
   std::filesystem::path asset_dir() const { return folder_ / "asset"; }
@@ -41,11 +50,12 @@ class BakeWorkspace {
   Result<void> publish();
 
  private:
-  BakeWorkspace(std::filesystem::path out, std::filesystem::path folder, int lock);
+  BakeWorkspace(std::filesystem::path out, std::filesystem::path folder, FileDescriptor lock, bool has_waited);
 
   std::filesystem::path out_;
   std::filesystem::path folder_;
-  int lock_ = -1;  ///< descriptor of folder_, locked; -1: moved from or published
+  bool has_waited_ = false;
+  std::optional<FileDescriptor> lock_;  ///< of folder_; none: moved from or published
 };
 
 }  // namespace farfield

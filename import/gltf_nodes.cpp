@@ -11,10 +11,90 @@ namespace {
 
 using tinygltf::Model;
 
+constexpr const char* kInstancing = "EXT_mesh_gpu_instancing";
+constexpr double kLargestId = 9007199254740992.0;  // 2^53: up to there doubles are exact
+
+std::string place_of_instancing(const tinygltf::Node& node) {
+  return fmt::format("node {} ({})", node.name, kInstancing);
+}
+
+/// The accessor of an attribute of EXT_mesh_gpu_instancing; -1: the file does not give the attribute.
+Result<int> attribute_accessor(const GltfDocument& document, const tinygltf::Node& node, const char* name) {
+  const auto extension = node.extensions.find(kInstancing);
+  if (extension == node.extensions.end() || !extension->second.Has("attributes")) return -1;
+  const tinygltf::Value& attributes = extension->second.Get("attributes");
+  if (!attributes.IsObject() || !attributes.Has(name)) return -1;
+  const double index = extension_number(attributes, name).value_or(-1);
+  if (!(index >= 0 && index < static_cast<double>(document.model.accessors.size()))) {
+    return document.bad(fmt::format("{}: no such accessor for {}", place_of_instancing(node), name));
+  }
+  return static_cast<int>(index);
+}
+
+/// Empty when the file does not give the attribute.
+Result<std::vector<double>> read_attribute(const GltfDocument& document, const tinygltf::Node& node, const char* name,
+                                           int components) {
+  FARFIELD_TRY_LET(const int accessor, attribute_accessor(document, node, name));
+  if (accessor < 0) return std::vector<double>();
+  return read_accessor(document, accessor, components);
+}
+
+Result<void> set_ids(const GltfDocument& document, const tinygltf::Node& node, std::vector<InstanceData>& data) {
+  FARFIELD_TRY_LET(const auto ids, read_attribute(document, node, "_ID", 1));
+  if (ids.empty()) return {};
+  if (ids.size() != data.size()) return document.bad(place_of_instancing(node) + ": _ID differs in length");
+  for (size_t i = 0; i < data.size(); ++i) {
+    if (!(ids[i] >= 0 && ids[i] <= kLargestId && ids[i] == std::floor(ids[i])))
+      return document.bad(fmt::format("{}: _ID {} is no whole number from 0", place_of_instancing(node), ids[i]));
+    data[i].id = static_cast<uint64_t>(ids[i]);
+  }
+  return {};
+}
+
+/// Three components, or four of which the last is left out.
+Result<void> set_tints(const GltfDocument& document, const tinygltf::Node& node, std::vector<InstanceData>& data) {
+  FARFIELD_TRY_LET(const int accessor, attribute_accessor(document, node, "_TINT"));
+  if (accessor < 0) return {};
+  const int components = component_count(document, accessor) == 4 ? 4 : 3;
+  FARFIELD_TRY_LET(const auto tints, read_accessor(document, accessor, components));
+  const auto step = static_cast<size_t>(components);
+  if (tints.size() != step * data.size()) return document.bad(place_of_instancing(node) + ": _TINT differs in length");
+  for (size_t i = 0; i < data.size(); ++i) {
+    data[i].tint = vec3(tints[step * i], tints[step * i + 1], tints[step * i + 2]);
+    if (!is_finite(data[i].tint)) return document.bad(place_of_instancing(node) + ": a _TINT is not finite");
+  }
+  return {};
+}
+
+/// Of all instances of the node.
+InstanceData data_of_extras(const tinygltf::Node& node) {
+  InstanceData data;
+  const double id = extension_number(node.extras, "farfield_id").value_or(0);
+  if (id >= 0 && id <= kLargestId) data.id = static_cast<uint64_t>(id);
+  data.tint = extension_vec3(node.extras, "farfield_tint").value_or(data.tint);
+  return data;
+}
+
 /// Zero and NaN quaternions become the identity.
 glm::dvec4 unit_quaternion(const glm::dvec4& q) {
   const double length = glm::length(q);
   return length > 0 && std::isfinite(length) ? q / length : glm::dvec4(0, 0, 0, 1);
+}
+
+/// A scene might list a node twice: it is there once.
+std::vector<int> depth_first(const Model& model, const std::vector<int>& roots) {
+  std::vector<bool> seen(model.nodes.size());
+  std::vector<int> order, stack(roots.rbegin(), roots.rend());
+  while (!stack.empty()) {
+    const int n = stack.back();
+    stack.pop_back();
+    if (seen[static_cast<size_t>(n)]) continue;
+    seen[static_cast<size_t>(n)] = true;
+    order.push_back(n);
+    const auto& children = model.nodes[static_cast<size_t>(n)].children;
+    stack.insert(stack.end(), children.rbegin(), children.rend());
+  }
+  return order;
 }
 
 }  // namespace
@@ -41,20 +121,10 @@ std::vector<int> scene_nodes(const GltfDocument& document) {
                              : 0;
     roots = model.scenes[scene].nodes;
   }
-  // A scene might list a node twice: it is shown once.
-  std::vector<bool> seen(model.nodes.size());
-  std::vector<int> order, stack(roots.rbegin(), roots.rend());
-  while (!stack.empty()) {
-    const int n = stack.back();
-    stack.pop_back();
-    if (seen[static_cast<size_t>(n)]) continue;
-    seen[static_cast<size_t>(n)] = true;
-    order.push_back(n);
-    const auto& children = model.nodes[static_cast<size_t>(n)].children;
-    stack.insert(stack.end(), children.rbegin(), children.rend());
-  }
-  return order;
+  return depth_first(model, roots);
 }
+
+std::vector<int> nodes_below(const Model& model, int root) { return depth_first(model, {root}); }
 
 NodeTransform transform_of(const tinygltf::Node& node) {
   NodeTransform out;
@@ -112,24 +182,11 @@ Result<std::optional<SkinPlace>> skin_place(const GltfDocument& document, const 
 }
 
 Result<std::vector<glm::dmat4>> instance_transforms(const GltfDocument& document, const tinygltf::Node& node) {
-  const auto extension = node.extensions.find("EXT_mesh_gpu_instancing");
-  if (extension == node.extensions.end()) return std::vector<glm::dmat4>{glm::dmat4(1.0)};
-  const auto place = fmt::format("node {} (EXT_mesh_gpu_instancing)", node.name);
-  const tinygltf::Value none,
-      &attributes = extension->second.Has("attributes") ? extension->second.Get("attributes") : none;
-
-  // Empty when the file does not give the attribute.
-  const auto read = [&](const char* name, int components) -> Result<std::vector<double>> {
-    if (!attributes.IsObject() || !attributes.Has(name)) return std::vector<double>();
-    const double index = extension_number(attributes, name).value_or(-1);
-    if (!(index >= 0 && index < static_cast<double>(document.model.accessors.size()))) {
-      return document.bad(fmt::format("{}: no such accessor for {}", place, name));
-    }
-    return read_accessor(document, static_cast<int>(index), components);
-  };
-  FARFIELD_TRY_LET(const auto translations, read("TRANSLATION", 3));
-  FARFIELD_TRY_LET(const auto rotations, read("ROTATION", 4));
-  FARFIELD_TRY_LET(const auto scales, read("SCALE", 3));
+  if (!node.extensions.contains(kInstancing)) return std::vector<glm::dmat4>{glm::dmat4(1.0)};
+  const auto place = place_of_instancing(node);
+  FARFIELD_TRY_LET(const auto translations, read_attribute(document, node, "TRANSLATION", 3));
+  FARFIELD_TRY_LET(const auto rotations, read_attribute(document, node, "ROTATION", 4));
+  FARFIELD_TRY_LET(const auto scales, read_attribute(document, node, "SCALE", 3));
 
   const size_t count = std::max({translations.size() / 3, rotations.size() / 4, scales.size() / 3});
   const auto fits = [count](const std::vector<double>& values, size_t components) {
@@ -148,6 +205,14 @@ Result<std::vector<glm::dmat4>> instance_transforms(const GltfDocument& document
     transforms.push_back(to_matrix(transform));
   }
   return transforms;
+}
+
+Result<std::vector<InstanceData>> instance_data(const GltfDocument& document, const tinygltf::Node& node,
+                                                size_t count) {
+  std::vector<InstanceData> data(count, data_of_extras(node));
+  FARFIELD_TRY(set_ids(document, node, data));
+  FARFIELD_TRY(set_tints(document, node, data));
+  return data;
 }
 
 bool has_weights_of_its_own(const GltfDocument& document, const tinygltf::Node& node) {

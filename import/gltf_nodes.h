@@ -7,12 +7,16 @@
 
 #include "base/result.h"
 #include "base/vec.h"
+#include "farfield/instance_data.h"
 #include "import/gltf_document.h"
 
 namespace farfield {
 
 /// The nodes of the default scene in depth-first order, parents first. Without a scene: all nodes that are no children.
 std::vector<int> scene_nodes(const GltfDocument& document);
+
+/// A node and all below it, parents first.
+std::vector<int> nodes_below(const tinygltf::Model& model, int root);
 
 /// For each node its parent, or -1.
 std::vector<int> parents(const tinygltf::Model& model);
@@ -30,6 +34,11 @@ glm::dmat4 to_matrix(const NodeTransform& transform);
 /// Where a node shows its mesh, in the node's own space: once at its origin, or as EXT_mesh_gpu_instancing says.
 /// Errors: BadFile (no such accessor, attributes of different lengths).
 Result<std::vector<glm::dmat4>> instance_transforms(const GltfDocument& document, const tinygltf::Node& node);
+
+/// What the file says for the host of each of a node's `count` instances: the attributes _ID and _TINT of
+/// EXT_mesh_gpu_instancing, else "farfield_id" and "farfield_tint" of the node's extras, else the default. Errors:
+/// BadFile (no such accessor, another length, ids that are no whole numbers from 0, tints that are not finite).
+Result<std::vector<InstanceData>> instance_data(const GltfDocument& document, const tinygltf::Node& node, size_t count);
 
 /// For each node whether KHR_node_visibility hides it, itself or by a node above it.
 std::vector<bool> hidden_nodes(const GltfDocument& document);

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "base/result.h"
+#include "import/gltf_assemblies.h"
 #include "import/gltf_document.h"
 #include "import/gltf_nodes.h"
 #include "import/read_file.h"
@@ -148,7 +149,8 @@ void place(GltfCamera& camera, const dmat4& world, const dvec3& origin) {
 
 class SceneReader {
  public:
-  explicit SceneReader(const GltfDocument& document) : document_(document), model_(document.model) {}
+  SceneReader(const GltfDocument& document, AssemblyRule rule)
+      : document_(document), model_(document.model), rule_(rule) {}
 
   Result<GltfScene> read() {
     scene_.warnings = document_.warnings;
@@ -164,17 +166,35 @@ class SceneReader {
       FARFIELD_TRY(read_animation(animation));
     }
     find_time_range();
+    FARFIELD_TRY(find_assets(order));
     FARFIELD_TRY(place_everything(order));
     return std::move(scene_);
   }
 
   void warn(std::string text) { scene_.warnings.push_back(std::move(text)); }
 
+  /// Equal meshes become one asset, and so do the parts of assemblies, which follow the meshes.
+  Result<void> find_assets(const std::vector<int>& order) {
+    first_equal_mesh_ = first_equal_meshes(document_);
+    FARFIELD_TRY_LET(assemblies_, find_assemblies(document_, order, scene_.meshes, first_equal_mesh_, rule_));
+    for (const std::string& warning : assemblies_.warnings) warn(warning);
+    for (const Assembly& assembly : assemblies_.kinds) {
+      GltfMesh asset;
+      asset.name = model_.nodes[static_cast<size_t>(assembly.node)].name;
+      asset.asset_name = unique_name(asset.name, fmt::format("node_{}", assembly.node));
+      asset.node = assembly.node;
+      asset.bounds = assembly.bounds;
+      asset.triangle_count = assembly.triangle_count;
+      scene_.meshes.push_back(std::move(asset));
+    }
+    return {};
+  }
+
   /// One broken mesh does not stop a scene: it stays empty, and is warned about.
   GltfMesh read_mesh_or_nothing(size_t index) {
     GltfMesh mesh;
     mesh.name = model_.meshes[index].name;
-    mesh.asset_name = unique_name(mesh.name, index);
+    mesh.asset_name = unique_name(mesh.name, fmt::format("mesh_{}", index));
     if (const auto measured = measure(model_.meshes[index], mesh); !measured) {
       warn(fmt::format("mesh {} ({}) is left out: {}", index, mesh.name, measured.error().message));
       mesh.bounds = Box3();
@@ -223,13 +243,13 @@ class SceneReader {
     return box;
   }
 
-  std::string unique_name(const std::string& name, size_t index) {
+  std::string unique_name(const std::string& name, const std::string& if_empty) {
     std::string clean = name.substr(0, 100);
     for (char& c : clean) {
       const bool is_plain = std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' || c == '.';
       if (!is_plain || static_cast<unsigned char>(c) > 127) c = '_';
     }
-    if (clean.empty()) clean = fmt::format("mesh_{}", index);
+    if (clean.empty()) clean = if_empty;
     if (clean[0] == '.') clean[0] = '_';
     std::string unique = clean;
     for (int n = 2; !taken_names_.insert(lower_case(unique)).second; ++n) unique = fmt::format("{}_{}", clean, n);
@@ -355,8 +375,11 @@ class SceneReader {
     const std::vector<dmat4> world = world_matrices(scene_, 0);
     const std::vector<bool> hidden = hidden_nodes(document_);
     for (uint32_t i = 0; i < order.size(); ++i) {
-      const auto& node = model_.nodes[static_cast<size_t>(order[i])];
-      if (node.mesh >= 0 && !hidden[static_cast<size_t>(order[i])])
+      const auto number = static_cast<size_t>(order[i]);
+      const auto& node = model_.nodes[number];
+      if (assemblies_.kind_of[number] >= 0)
+        FARFIELD_TRY(add_assembly(order[i], i, world));
+      else if (node.mesh >= 0 && !hidden[number] && !assemblies_.is_part[number])
         FARFIELD_TRY(add_instances(node, order[i], i, world));
     }
     place_instances();
@@ -370,10 +393,34 @@ class SceneReader {
     return {};
   }
 
+  Result<void> add_assembly(int number, uint32_t index, const std::vector<dmat4>& worlds) {
+    const auto kind = static_cast<size_t>(assemblies_.kind_of[static_cast<size_t>(number)]);
+    FARFIELD_TRY_LET(const auto data, data_of_node(number));
+    show(number, static_cast<uint32_t>(model_.meshes.size() + kind), index, worlds, {dmat4(1.0)}, {data});
+    return {};
+  }
+
   Result<void> add_instances(const tinygltf::Node& node, int number, uint32_t index, const std::vector<dmat4>& worlds) {
     FARFIELD_TRY_LET(auto transforms, instance_transforms(document_, node));
+    FARFIELD_TRY_LET(const auto data, instance_data(document_, node, transforms.size()));
     if (node.skin >= 0) FARFIELD_TRY(move_to_skeleton(node, number, index, transforms));
     if (has_weights_of_its_own(document_, node)) warn(fmt::format("node {} ({}): {}", number, node.name, kOwnWeights));
+    show(number, first_equal_mesh_[static_cast<size_t>(node.mesh)], index, worlds, transforms, data);
+    return {};
+  }
+
+  /// Of a node that is one instance, whatever its own mesh is.
+  Result<InstanceData> data_of_node(int number) {
+    tinygltf::Node alone;
+    alone.extras = model_.nodes[static_cast<size_t>(number)].extras;
+    FARFIELD_TRY_LET(const auto data, instance_data(document_, alone, 1));
+    return data[0];
+  }
+
+  /// Instances of an asset at a node: once for each transform, with the data of the same number.
+  void show(int number, uint32_t asset, uint32_t index, const std::vector<dmat4>& worlds,
+            const std::vector<dmat4>& transforms, const std::vector<InstanceData>& data) {
+    const std::string& name = model_.nodes[static_cast<size_t>(number)].name;
     const dmat4& world = worlds[index];
     const auto first_seen = [&](const dmat4& in_node) -> std::optional<dmat4> {
       if (is_invertible(world * in_node)) return world * in_node;
@@ -384,18 +431,17 @@ class SceneReader {
       return std::nullopt;
     };
     size_t singular = 0;
-    for (const dmat4& transform : transforms) {
-      const mat4x3 in_node = to_affine(transform);
+    for (size_t i = 0; i < transforms.size(); ++i) {
+      const mat4x3 in_node = to_affine(transforms[i]);
       const auto seen = first_seen(to_square(in_node));
       if (seen) {
-        scene_.instances.push_back({static_cast<uint32_t>(node.mesh), mat4x3(1), node.name, index, in_node});
+        scene_.instances.push_back({asset, mat4x3(1), name, index, data[i], in_node});
         places_.push_back(*seen);
       } else {
         ++singular;
       }
     }
-    if (singular > 0) warn(fmt::format("node {} ({}): its transform is singular; left out", number, node.name));
-    return {};
+    if (singular > 0) warn(fmt::format("node {} ({}): its transform is singular; left out", number, name));
   }
 
   /// A skinned mesh goes with a joint instead of with its node.
@@ -509,7 +555,10 @@ class SceneReader {
 
   const GltfDocument& document_;
   const tinygltf::Model& model_;
+  const AssemblyRule rule_;
   GltfScene scene_;
+  std::vector<uint32_t> first_equal_mesh_;
+  Assemblies assemblies_;
   std::vector<int32_t> scene_index_;  ///< of each node of the file, or -1 when it is not in the scene
   std::vector<dmat4> places_;         ///< of the instances, in the file's coordinates
   std::set<std::string> taken_names_;
@@ -549,10 +598,20 @@ Box3 GltfScene::bounds_world() const {
   return box;
 }
 
-Result<GltfScene> read_gltf_scene(const std::filesystem::path& path) {
+const char* name_of(AssemblyRule rule) {
+  return rule == AssemblyRule::None ? "none" : rule == AssemblyRule::Marked ? "marked" : "repeated";
+}
+
+Result<AssemblyRule> parse_assembly_rule(const std::string& name) {
+  for (const auto rule : {AssemblyRule::None, AssemblyRule::Marked, AssemblyRule::Repeated})
+    if (name == name_of(rule)) return rule;
+  return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is none of none, marked, repeated", name));
+}
+
+Result<GltfScene> read_gltf_scene(const std::filesystem::path& path, AssemblyRule assemblies) {
   FARFIELD_TRY_LET(const auto bytes, read_file(path));
   FARFIELD_TRY_LET(const auto document, open_gltf(bytes, path));
-  return SceneReader(document).read();
+  return SceneReader(document, assemblies).read();
 }
 
 }  // namespace farfield

@@ -10,13 +10,27 @@
 
 #include "base/result.h"
 #include "base/vec.h"
+#include "farfield/instance_data.h"
 
 namespace farfield {
 
+/// Which nodes are one asset together with all below them: docs/scene_format.md, "What becomes one asset".
+enum class AssemblyRule : uint8_t {
+  None,      ///< each mesh is an asset of its own
+  Marked,    ///< those whose extras say "farfield_asset": true
+  Repeated,  ///< those, and things of several meshes that the scene repeats
+};
+/// "none", "marked", "repeated".
+const char* name_of(AssemblyRule rule);
+/// Errors: InvalidArgument, with the names that there are.
+Result<AssemblyRule> parse_assembly_rule(const std::string& name);
+
+/// What is baked as one asset: a mesh, or an assembly of several.
 struct GltfMesh {
-  std::string name;             ///< as in the file; may be empty or repeated
-  std::string asset_name;       ///< unique in the file, fit for a file name: what its baked asset is called
-  Box3 bounds;                  ///< mesh space, from the accessors' min and max (quantised ones decoded); may be empty
+  std::string name;        ///< as in the file, of an assembly its node's; may be empty or repeated
+  std::string asset_name;  ///< unique in the file, fit for a file name: what its baked asset is called
+  int32_t node = -1;       ///< of the file: an assembly of all that this node and those below show; -1: a mesh
+  Box3 bounds;  ///< mesh space (the node's own), from the accessors' min and max (quantised ones decoded); may be empty
   uint64_t triangle_count = 0;  ///< as the accessors promise it; 0 means there is nothing to bake
 };
 
@@ -26,6 +40,7 @@ struct GltfInstance {
   mat4x3 to_world{1};  ///< mesh space to world; may scale, mirror and shear; always finite and invertible
   std::string name;    ///< of the node
   uint32_t node = 0;   ///< index into GltfScene::nodes
+  InstanceData data;   ///< what the file says of it for the host
   mat4x3 in_node{1};   ///< mesh space to the node's space: EXT_mesh_gpu_instancing shows a mesh many times in one node
 };
 
@@ -82,7 +97,9 @@ struct GltfScene {
   /// Subtracted from all that stands in the world, in double precision: map coordinates leave a float no digits. The
   /// middle of the scene if that lies far from 0 for its size, else 0.
   dvec3 origin_world{0.0};
-  std::vector<GltfMesh> meshes;  ///< all of the file, instanced or not
+  /// All meshes of the file under their numbers, instanced or not, then assemblies. Of equal ones only the first is
+  /// instanced.
+  std::vector<GltfMesh> meshes;
   /// Of the default scene, in the order of a depth-first walk: all that are to be seen at some time, where they stand
   /// at time 0 or, if their transform is singular then (a plant that grows from nothing), as soon as it is not.
   std::vector<GltfInstance> instances;
@@ -107,6 +124,6 @@ struct GltfScene {
 /// Reads the default scene (the first, if none is marked) of a .glb or .gltf, gzipped or not.
 /// Errors: NotFound, Io, BadFile (with node cycles, indices out of range), Unsupported (required extensions that this
 /// version does not know, by name).
-Result<GltfScene> read_gltf_scene(const std::filesystem::path& path);
+Result<GltfScene> read_gltf_scene(const std::filesystem::path& path, AssemblyRule assemblies = AssemblyRule::Repeated);
 
 }  // namespace farfield

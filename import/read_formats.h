@@ -14,7 +14,9 @@ namespace farfield {
 Result<SourceMesh> read_obj(std::span<const unsigned char> bytes, const std::filesystem::path& path);
 Result<SourceMesh> read_ply(std::span<const unsigned char> bytes, const std::filesystem::path& path);
 
-/// mesh: that mesh in its own space, or -1 for all nodes of the default scene, flattened.
-Result<SourceMesh> read_gltf(std::span<const unsigned char> bytes, const std::filesystem::path& path, int mesh);
+/// mesh: that mesh in its own space; node: that node and all below it, flattened, in its own space; both -1: all nodes
+/// of the default scene, flattened.
+Result<SourceMesh> read_gltf(std::span<const unsigned char> bytes, const std::filesystem::path& path, int mesh,
+                             int node);
 
 }  // namespace farfield

@@ -339,17 +339,17 @@ class GltfMeshReader {
   explicit GltfMeshReader(const GltfDocument& document)
       : document_(document), model_(document.model), materials_(document, mesh_) {}
 
-  Result<SourceMesh> read(int mesh) {
+  Result<SourceMesh> read(int mesh, int node) {
     mesh_.warnings = document_.warnings;
     mesh_.source_files = document_.files;
-    return with_warnings(read_all(mesh), mesh_.warnings);
+    return with_warnings(read_all(mesh, node), mesh_.warnings);
   }
 
  private:
   static vec2 no_uv() { return vec2(std::numeric_limits<float>::quiet_NaN()); }
 
-  Result<SourceMesh> read_all(int mesh) {
-    FARFIELD_TRY(mesh >= 0 ? read_one(mesh) : read_scene());
+  Result<SourceMesh> read_all(int mesh, int node) {
+    FARFIELD_TRY(mesh >= 0 ? read_one(mesh) : node >= 0 ? read_below(node) : read_scene());
     FARFIELD_TRY(materials_.ready());
     if (!mesh_.corner_uv.empty()) mesh_.corner_uv.resize(mesh_.corner_count(), no_uv());
     if (!mesh_.corner_color.empty()) mesh_.corner_color.resize(mesh_.corner_count(), vec4(1.0f));
@@ -373,7 +373,20 @@ class GltfMeshReader {
       return {};
     }
     const std::vector<int> order = scene_nodes(document_);
-    const std::vector<glm::dmat4> world = world_matrices(order);
+    return read_nodes(order, world_matrices(order, parents(model_)));
+  }
+
+  /// A node's own transform is that of its instances, not its own.
+  Result<void> read_below(int root) {
+    if (root >= static_cast<int>(model_.nodes.size())) {
+      return make_error(ErrorCode::InvalidArgument,
+                        fmt::format("{}: there is no node {}, only {}", document_.name, root, model_.nodes.size()));
+    }
+    const std::vector<int> order = nodes_below(model_, root);
+    return read_nodes(order, world_matrices({order.begin() + 1, order.end()}, parents(model_)));
+  }
+
+  Result<void> read_nodes(const std::vector<int>& order, const std::vector<glm::dmat4>& world) {
     const std::vector<bool> hidden = hidden_nodes(document_);
     for (const int n : order) {
       const auto& node = model_.nodes[static_cast<size_t>(n)];
@@ -384,8 +397,8 @@ class GltfMeshReader {
     return {};
   }
 
-  std::vector<glm::dmat4> world_matrices(const std::vector<int>& order) const {
-    const std::vector<int> parent = parents(model_);
+  /// Of the nodes in `order`, parents first; all others stand at the origin.
+  std::vector<glm::dmat4> world_matrices(const std::vector<int>& order, const std::vector<int>& parent) const {
     std::vector<glm::dmat4> world(model_.nodes.size(), glm::dmat4(1.0));
     for (const int n : order) {
       const auto at = static_cast<size_t>(n);
@@ -586,9 +599,10 @@ class GltfMeshReader {
 
 }  // namespace
 
-Result<SourceMesh> read_gltf(std::span<const unsigned char> bytes, const std::filesystem::path& path, int mesh) {
+Result<SourceMesh> read_gltf(std::span<const unsigned char> bytes, const std::filesystem::path& path, int mesh,
+                             int node) {
   FARFIELD_TRY_LET(const auto document, open_gltf(bytes, path));
-  return GltfMeshReader(document).read(mesh);
+  return GltfMeshReader(document).read(mesh, node);
 }
 
 }  // namespace farfield

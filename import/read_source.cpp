@@ -35,11 +35,11 @@ bool starts_with(const Bytes& bytes, std::string_view text) {
 Result<SourceMesh> read_as_named(const Bytes& bytes, const fs::path& path, const ImportOptions& options) {
   const std::string extension = extension_of(path);
   if (starts_with(bytes, "glTF") || extension == ".gltf" || extension == ".glb") {
-    return read_gltf(bytes, path, options.mesh);
+    return read_gltf(bytes, path, options.mesh, options.node);
   }
-  if (options.mesh >= 0) {
+  if (options.mesh >= 0 || options.node >= 0) {
     return make_error(ErrorCode::InvalidArgument,
-                      fmt::format("{}: only glTF files have numbered meshes", path.string()));
+                      fmt::format("{}: only glTF files have numbered meshes and nodes", path.string()));
   }
   if (starts_with(bytes, "ply") || extension == ".ply") return read_ply(bytes, path);
   if (extension == ".obj") return read_obj(bytes, path);
@@ -58,7 +58,8 @@ uint64_t combine(uint64_t main_file, const std::vector<HashedFile>& files, const
   for (const HashedFile& file : files) {
     if (file.hash != 0) others = mix64(others, file.hash);
   }
-  return mix64(mix64(main_file, others), static_cast<uint64_t>(options.mesh));
+  const uint64_t hash = mix64(mix64(main_file, others), static_cast<uint64_t>(options.mesh));
+  return options.node < 0 ? hash : mix64(hash, static_cast<uint64_t>(options.node));
 }
 
 }  // namespace

@@ -23,13 +23,14 @@ class FileHashes {
 struct ImportOptions {
   int mesh =
       -1;  ///< glTF only: import this mesh alone, in its own space; -1: all nodes of the default scene, flattened
+  int node = -1;  ///< glTF only: import all that this node of the file and those below show, in the node's own space
   FileHashes* known_hashes = nullptr;  ///< hash_source() looks there first; null: it reads
 };
 
 /// Reads the file and those that it refers to. Content decides what a file is where it says so, its name otherwise.
 /// Positions may be infinite or NaN and polygons degenerate, as the file has them; all indices are in range. Errors:
-/// NotFound, Io, BadFile, Unsupported, InvalidArgument (no such mesh): one line that names the file, the place and the
-/// remedy. Never crashes on bad files.
+/// NotFound, Io, BadFile, Unsupported, InvalidArgument (no such mesh or node): one line that names the file, the place
+/// and the remedy. Never crashes on bad files.
 Result<SourceMesh> read_source(const std::filesystem::path& path, const ImportOptions& options = {});
 
 /// The source_hash that read_source() would give a source that still refers to `files`: of the bytes of the main file

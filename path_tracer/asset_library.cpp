@@ -1,24 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "path_tracer/asset_library.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <signal.h>
-#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <chrono>
-#include <cstring>
+#include <algorithm>
+#include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
-#include <thread>
 
 #include "bake/bake.h"
 #include "base/parallel.h"
 #include "base/result.h"
 #include "cache/manifest.h"
+#include "path_tracer/child_process.h"
+#include "path_tracer/scene_assets.h"
 
 namespace farfield {
 
@@ -26,7 +25,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::chrono::milliseconds kPollInterval{10};
 constexpr int kBakeFailed = 1;  // exit code of `farfield bake` that says why on standard error
 
 // "forest" for forest.glb, forest.gltf, forest.glb.gz.
@@ -36,42 +34,6 @@ std::string scene_name(const fs::path& scene) {
   return name.stem().string();
 }
 
-// Starts a program with standard output closed to the world; standard error stays ours, so its progress line and its
-// error line are seen.
-Result<pid_t> start(const std::vector<std::string>& arguments) {
-  std::vector<char*> argv;
-  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
-  argv.push_back(nullptr);
-
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  pid_t child = 0;
-  const int error = posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (error != 0) return make_error(ErrorCode::Io, fmt::format("cannot start {}: {}", argv[0], std::strerror(error)));
-  return child;
-}
-
-// Waits for a child; when the job is cancelled, asks it to stop first (a bake keeps the levels that it finished).
-Result<int> wait_for(pid_t child, const RenderOptions& options) {
-  bool asked_to_stop = false;
-  for (;;) {
-    int status = 0;
-    const pid_t ended = waitpid(child, &status, WNOHANG);
-    if (ended < 0) return make_error(ErrorCode::Io, fmt::format("cannot wait for a bake: {}", std::strerror(errno)));
-    if (ended == child) {
-      if (asked_to_stop) return make_error(ErrorCode::Cancelled, "cancelled");
-      return status;
-    }
-    if (!asked_to_stop && options.job.is_cancelled()) {
-      kill(child, SIGTERM);
-      asked_to_stop = true;
-    }
-    std::this_thread::sleep_for(kPollInterval);
-  }
-}
-
 // Not "/proc/self/exe" itself, so that the child has this program's name in `ps`.
 std::string this_program() {
   std::error_code error;
@@ -79,30 +41,34 @@ std::string this_program() {
   return error ? "/proc/self/exe" : program.string();
 }
 
-std::vector<std::string> bake_command(const RenderOptions& options, size_t mesh, const fs::path& folder) {
-  std::vector<std::string> command = {options.baker.empty() ? this_program() : options.baker.string(),
-                                      "bake",
-                                      options.scene.string(),
-                                      "-o",
-                                      folder.string(),
-                                      "--mesh",
-                                      fmt::format("{}", mesh),
-                                      "--finest-grid",
-                                      fmt::format("{}", options.finest_grid),
-                                      "--threads",
-                                      fmt::format("{}", thread_count()),
-                                      "--no-warnings"};  // said here, from the manifest
-  if (options.full_detail) command.push_back("--source-only");
-  return command;
-}
-
-BakeOptions bake_options(const RenderOptions& options, size_t mesh, FileHashes& hashes) {
-  BakeOptions bake;
+SceneBakeOptions scene_bake_options(const RenderOptions& options) {
+  SceneBakeOptions bake;
+  bake.scene = options.scene;
+  bake.library = asset_library_folder(options);
   bake.finest_grid = options.finest_grid;
   bake.source_only = options.full_detail;
-  bake.import.mesh = static_cast<int>(mesh);
-  bake.import.known_hashes = &hashes;
+  bake.assemblies = options.assemblies;
   return bake;
+}
+
+std::vector<std::string> bake_command(const RenderOptions& options, const SceneBakeOptions& bake) {
+  std::vector<std::string> command = {options.baker.empty() ? this_program() : options.baker.string(),
+                                      "bake",
+                                      bake.scene.string(),
+                                      "--scene",
+                                      "-o",
+                                      bake.library.string(),
+                                      "--finest-grid",
+                                      fmt::format("{}", bake.finest_grid),
+                                      "--assemblies",
+                                      name_of(bake.assemblies),
+                                      "--threads",
+                                      fmt::format("{}", thread_count()),
+                                      "--parent",
+                                      fmt::format("{}", ::getpid()),
+                                      "--no-warnings"};  // said here, from the manifests
+  if (bake.source_only) command.push_back("--source-only");
+  return command;
 }
 
 void warn(const RenderOptions& options, const std::string& line) {
@@ -115,37 +81,38 @@ void repeat_warnings(const RenderOptions& options, const GltfMesh& mesh, const M
     warn(options, fmt::format("mesh {}: {}", mesh.asset_name, warning));
 }
 
-// Errors: Unsupported, when it is the mesh that cannot be baked and others may; else Io, BadFile, Cancelled.
-Result<void> bake_mesh(const GltfScene& scene, const RenderOptions& options, size_t mesh, const fs::path& folder) {
-  FARFIELD_TRY_LET(const auto child, start(bake_command(options, mesh, folder)));
-  FARFIELD_TRY_LET(const auto status, wait_for(child, options));
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
+// "asset 3 \"maple\"", or the scene itself if nothing tells which asset it was.
+std::string what_was_baked(const GltfScene& scene, const std::string& asset) {
+  const auto mesh = std::ranges::find(scene.meshes, asset, &GltfMesh::asset_name);
+  if (mesh == scene.meshes.end()) return "its assets";
+  return fmt::format("mesh {} \"{}\"", mesh - scene.meshes.begin(), mesh->name);
+}
+
+// What the bake says of the assets, line by line: "baking NAME", then "ready NAME" or "failed NAME".
+struct BakeNews {
+  std::string at;  ///< the asset that it works on
+  std::map<std::string, bool> is_ready;
+
+  void read(std::string_view line) {
+    const size_t blank = std::min(line.find(' '), line.size());
+    const std::string_view what = line.substr(0, blank);
+    const std::string asset(line.substr(std::min(blank + 1, line.size())));
+    if (what == "baking") at = asset;
+    if (what == "ready" || what == "failed") is_ready[asset] = what == "ready";
+  }
+};
+
+// Bakes all that is missing in a process of its own. Errors: Io, BadFile, Cancelled.
+Result<BakeNews> bake_in_a_process(const GltfScene& scene, const RenderOptions& options, const SceneBakeOptions& bake) {
+  BakeNews news;
+  FARFIELD_TRY_LET(const int status, run_child(bake_command(options, bake), options.job,
+                                               [&](std::string_view line) { news.read(line); }));
+  if (WIFEXITED(status) && (WEXITSTATUS(status) == 0 || WEXITSTATUS(status) == kBakeFailed)) return news;
   if (options.job.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
   const std::string how = WIFSIGNALED(status) ? fmt::format("signal {}", WTERMSIG(status))
                                               : fmt::format("exit code {}", WEXITSTATUS(status));
-  const bool has_refused = WIFEXITED(status) && WEXITSTATUS(status) == kBakeFailed;
-  return make_error(
-      has_refused ? ErrorCode::Unsupported : ErrorCode::BadFile,
-      fmt::format("{}: baking mesh {} \"{}\" failed ({})", options.scene.string(), mesh, scene.meshes[mesh].name, how));
-}
-
-// The mesh's asset is in `folder` afterwards, up to date, and its warnings have been said.
-Result<void> find_or_bake(const GltfScene& scene, const RenderOptions& options, size_t mesh, const fs::path& folder,
-                          FileHashes& hashes) {
-  if (const auto found = find_up_to_date(options.scene, folder, bake_options(options, mesh, hashes))) {
-    repeat_warnings(options, scene.meshes[mesh], *found);
-    return {};
-  }
-  FARFIELD_TRY(bake_mesh(scene, options, mesh, folder));
-  if (const auto baked = read_manifest(folder)) repeat_warnings(options, scene.meshes[mesh], *baked);
-  return {};
-}
-
-std::vector<bool> meshes_in_use(const GltfScene& scene) {
-  std::vector<bool> in_use(scene.meshes.size(), false);
-  for (const GltfInstance& instance : scene.instances)
-    in_use[instance.mesh] = scene.meshes[instance.mesh].triangle_count > 0;
-  return in_use;
+  return make_error(ErrorCode::BadFile, fmt::format("{}: baking {} failed ({})", options.scene.string(),
+                                                    what_was_baked(scene, news.at), how));
 }
 
 }  // namespace
@@ -157,33 +124,45 @@ fs::path asset_library_folder(const RenderOptions& options) {
 }
 
 Result<std::vector<fs::path>> find_or_bake_assets(const GltfScene& scene, const RenderOptions& options) {
-  const fs::path library = asset_library_folder(options);
+  const SceneBakeOptions bake = scene_bake_options(options);
   std::error_code error;
-  fs::create_directories(library, error);
+  fs::create_directories(bake.library, error);
   if (error)
     return make_error(ErrorCode::Io, fmt::format("cannot create {}: {}; choose another folder with --assets",
-                                                 library.string(), error.message()));
+                                                 bake.library.string(), error.message()));
 
-  const std::vector<bool> in_use = meshes_in_use(scene);
+  const std::vector<bool> in_use = assets_in_use(scene);
   std::vector<fs::path> folders(scene.meshes.size());
+  std::vector<size_t> missing;
   FileHashes hashes;  // the scene is read once, however many meshes it has
-  std::optional<Error> first_failure;
-  bool any = false;
   for (size_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {
     if (!in_use[mesh]) continue;
-    const char* suffix = options.full_detail ? ".source.farfield" : ".farfield";
-    const fs::path folder = library / (scene.meshes[mesh].asset_name + suffix);
-    const auto found = find_or_bake(scene, options, mesh, folder, hashes);
+    const fs::path folder = asset_folder(bake, scene.meshes[mesh]);
+    const auto found = find_up_to_date(options.scene, folder, asset_bake_options(bake, scene, mesh, hashes));
     if (found) {
       folders[mesh] = folder;
-      any = true;
-      continue;
+      repeat_warnings(options, scene.meshes[mesh], *found);
+    } else {
+      missing.push_back(mesh);
     }
-    if (found.error().code != ErrorCode::Unsupported) return tl::unexpected(found.error());
-    if (!first_failure) first_failure = found.error();
-    warn(options, fmt::format("{}; the picture is without it", found.error().message));
   }
-  if (first_failure && !any) return tl::unexpected(*first_failure);
+  if (missing.empty()) return folders;
+
+  FARFIELD_TRY_LET(auto news, bake_in_a_process(scene, options, bake));
+  std::string first_failure;
+  for (const size_t mesh : missing) {
+    if (news.is_ready[scene.meshes[mesh].asset_name]) {
+      folders[mesh] = asset_folder(bake, scene.meshes[mesh]);
+      if (const auto baked = read_manifest(folders[mesh])) repeat_warnings(options, scene.meshes[mesh], *baked);
+    } else {
+      const std::string failure = fmt::format("{}: baking {} failed", options.scene.string(),
+                                              what_was_baked(scene, scene.meshes[mesh].asset_name));
+      if (first_failure.empty()) first_failure = failure;
+      warn(options, failure + "; the picture is without it");
+    }
+  }
+  const bool any = std::ranges::any_of(folders, [](const fs::path& folder) { return !folder.empty(); });
+  if (!first_failure.empty() && !any) return make_error(ErrorCode::Unsupported, first_failure);
   return folders;
 }
 

@@ -21,10 +21,10 @@ std::filesystem::path asset_library_folder(const RenderOptions& options);
 
 /// For each mesh of the scene the folder of its baked asset, up to date with the scene and the options; empty for
 /// meshes that no instance shows, that have no triangles, or that cannot be baked while others can: each of those is a
-/// warning, and the scene is shown without it. Warnings of the bakes are said, too. Bakes what is missing or stale, one
-/// mesh after the other, each in a process of its own (`farfield bake SCENE -o DIR --mesh N`), so that this one's
-/// memory stays what rendering needs. Errors: Io (the bake cannot be started), BadFile (it was killed), Unsupported (no
-/// mesh could be baked; the bakes have said why on standard error), Cancelled.
+/// warning, and the scene is shown without it. Warnings of the bakes are said, too. What is missing or stale is baked
+/// by one process (`farfield bake SCENE --scene -o LIBRARY`), started only if there is any, so that this one's memory
+/// stays what rendering needs; it ends when this one does, however that comes. Errors: Io (the bake cannot be started),
+/// BadFile (it was killed), Unsupported (no mesh could be baked; the bake has said why on standard error), Cancelled.
 Result<std::vector<std::filesystem::path>> find_or_bake_assets(const GltfScene& scene, const RenderOptions& options);
 
 }  // namespace farfield

@@ -123,7 +123,7 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOption
   renderer->options_.warning = [log = renderer->warnings_](const std::string& line) { log->add(line); };
   const RenderOptions& options = renderer->options_;
 
-  FARFIELD_TRY_LET(auto scene, read_gltf_scene(options.scene));
+  FARFIELD_TRY_LET(auto scene, read_gltf_scene(options.scene, options.assemblies));
   for (const std::string& warning : scene.warnings) options.warning(warning);  // before an error may come
   FARFIELD_TRY_LET(const auto camera, find_camera(scene, options.camera));
   renderer->camera_ = camera;

@@ -12,6 +12,7 @@
 #include "base/job.h"
 #include "base/result.h"
 #include "farfield/runtime.h"
+#include "import/gltf_scene.h"
 #include "path_tracer/integrator.h"
 
 namespace farfield {
@@ -35,7 +36,8 @@ struct RenderOptions {
   float exposure_stops = 0;           ///< of the PNG previews
   bool cryptomatte = false;           ///< also write ids of objects and materials, see film.h
   uint32_t finest_grid = 512;         ///< of assets that have to be baked first
-  /// Command that bakes: called as BAKER bake SCENE -o DIR --mesh N ... Empty: this very program.
+  AssemblyRule assemblies = AssemblyRule::Repeated;  ///< which subtrees of the scene are baked as one
+  /// Command that bakes: called as BAKER bake SCENE --scene -o LIBRARY ... Empty: this very program.
   std::filesystem::path baker;
   std::function<void(const std::string& line)> message;  ///< for a person who waits, one line each; may be empty
   std::function<void(const std::string& line)> warning;  ///< what is ignored, guessed or degraded, each line

@@ -45,7 +45,7 @@ Result<std::unique_ptr<RenderSession>> RenderSession::open(EmbreeDeviceRef devic
   }
   for (const GltfInstance& instance : instances) {
     if (folders[instance.mesh].empty()) continue;
-    if (auto added = session->runtime_->add_instance(assets[instance.mesh], instance.to_world); !added)
+    if (auto added = session->runtime_->add_instance(assets[instance.mesh], instance.to_world, instance.data); !added)
       return tl::unexpected(added.error());
     if (!names.empty()) session->ids_.add_instance(instance);
   }

@@ -10,6 +10,7 @@
 #include "python/long_call.h"
 #include "python/materials.h"
 #include "python/render.h"
+#include "python/scene.h"
 #include "tools/info_text.h"
 
 namespace farfield::python {
@@ -71,6 +72,7 @@ PYBIND11_MODULE(_farfield, module) {
   define_materials(module);
   define_bake(module);
   define_render(module);
+  define_scene(module);
   module.def("info", &info);
   module.def("evaluate", &evaluate_asset);
 }

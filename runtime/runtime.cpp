@@ -51,7 +51,8 @@ struct Runtime::Impl {
   /// Tells the budget what the instances take.
   void count_instances() {
     levels.set_instance_bytes(geometry.instances.capacity() * sizeof(InstanceRecord) +
-                              geometry.instances.size() * kHostBytesPerInstance);
+                              geometry.instances.size() * kHostBytesPerInstance +
+                              instance_data.capacity() * sizeof(InstanceData));
   }
   const TracedLevel* level_of(const HitRecord& hit) const;
 
@@ -61,6 +62,7 @@ struct Runtime::Impl {
   InstanceGeometry geometry{levels};
   FramePlanner planner;
   HostScene host;
+  std::vector<InstanceData> instance_data;  ///< per instance, up to the last one that has any
   std::atomic<bool> said_stale_hit{false};
 };
 
@@ -117,7 +119,7 @@ void Runtime::bounds(AssetId asset, glm::vec3& lower, glm::vec3& upper) const {
   upper = box.upper;
 }
 
-Result<InstanceId> Runtime::add_instance(AssetId asset, const glm::mat4x3& local_to_world) {
+Result<InstanceId> Runtime::add_instance(AssetId asset, const glm::mat4x3& local_to_world, const InstanceData& data) {
   if (asset.value >= impl_->levels.asset_count()) {
     return make_error(ErrorCode::InvalidArgument, fmt::format("there is no asset {}", asset.value));
   }
@@ -127,7 +129,16 @@ Result<InstanceId> Runtime::add_instance(AssetId asset, const glm::mat4x3& local
   FARFIELD_TRY_LET(auto record, make_instance(asset.value, with_origin(local_to_world, origin)));
   record.footprint.world_to_r0 = impl_->options.pixel_error / largest_stretch(local_to_world);
   instances.push_back(record);
+  if (data != InstanceData()) {
+    impl_->instance_data.resize(instances.size());
+    impl_->instance_data.back() = data;
+  }
   return InstanceId{static_cast<uint32_t>(instances.size() - 1)};
+}
+
+InstanceData Runtime::instance_data(const Interaction& interaction) const {
+  const std::vector<InstanceData>& data = impl_->instance_data;
+  return interaction.instance < data.size() ? data[interaction.instance] : InstanceData();
 }
 
 void Runtime::set_cameras(std::vector<TessellationCamera> cameras) { impl_->planner.set_cameras(std::move(cameras)); }

@@ -4,6 +4,7 @@
 #include "bake/bake.h"
 #include "base/bytes.h"
 #include "base/parallel.h"
+#include "path_tracer/scene_assets.h"
 #include "tools/commands.h"
 #include "tools/console.h"
 #include "tools/flags.h"
@@ -16,6 +17,9 @@ namespace {
 
 struct BakeArguments {
   std::string source, output, report;
+  bool whole_scene = false;
+  AssemblyRule assemblies = AssemblyRule::Repeated;
+  int parent = 0;  // process that started this one for itself; 0: nobody did
   int threads = 0;
   bool warnings = true;
   BakeOptions options;
@@ -29,13 +33,57 @@ void print_summary(const BakeArguments& arguments, const BakeReport& report) {
              report.up_to_date ? "up to date" : fmt::format("baked in {:.1f} s", report.total_seconds));
 }
 
+/// On standard output a line before and after each asset, for whoever started this. Exit code 1 if one failed.
+Result<void> bake_scene(const BakeArguments& arguments) {
+  ProgressLine progress;
+  SceneBakeOptions options;
+  options.scene = arguments.source;
+  options.library = arguments.output;
+  options.finest_grid = arguments.options.finest_grid;
+  options.coarsest_grid = arguments.options.coarsest_grid;
+  options.rays_per_voxel = arguments.options.rays_per_voxel;
+  options.source_only = arguments.options.source_only;
+  options.assemblies = arguments.assemblies;
+  options.job = arguments.options.job;
+  options.job.progress = [&](double done, const std::string& stage) { progress.update(done, stage); };
+  const auto say = [&](const char* what, const std::string& asset) {
+    progress.clear();
+    fmt::print("{} {}\n", what, asset);
+    std::fflush(stdout);
+  };
+  const auto warn = [&](const std::vector<std::string>& lines) {
+    progress.clear();
+    print_warnings("bake", lines);
+  };
+  options.begin = [&](const std::string& asset) { say("baking", asset); };
+  options.end = [&](const std::string& asset, const Result<BakeReport>& report) {
+    if (report && arguments.warnings) warn(report->warnings);
+    if (!report) {
+      warn(report.error().warnings);
+      warn({fmt::format("{}: {}", asset, report.error().message)});
+    }
+    say(report ? "ready" : "failed", asset);
+  };
+  options.warning = [&](const std::string& line) {
+    if (arguments.warnings) warn({line});
+  };
+  const auto failed = bake_scene_assets(options);
+  progress.clear();
+  if (!failed) return tl::unexpected(failed.error());
+  if (*failed == 0) return {};
+  return make_error(ErrorCode::Unsupported,
+                    fmt::format("{}: {} of its assets cannot be baked", arguments.source, *failed));
+}
+
 Result<void> run_bake(BakeArguments& arguments) {
   if (auto writable = check_can_write(arguments.report, Output::Text, {arguments.source, arguments.output}); !writable)
     return writable;
   const ThreadLimit limit(arguments.threads);
+  arguments.options.job.cancel = &catch_interrupts();
+  end_with_parent(arguments.parent);
+  if (arguments.whole_scene) return bake_scene(arguments);
   ProgressLine progress;
-  arguments.options.job = {[&](double done, const std::string& stage) { progress.update(done, stage); },
-                           &catch_interrupts()};
+  arguments.options.job.progress = [&](double done, const std::string& stage) { progress.update(done, stage); };
 
   const auto report = bake(arguments.source, arguments.output, arguments.options);
   progress.clear();
@@ -65,15 +113,31 @@ void add_bake_command(CLI::App& app, Action& action) {
   command->add_option("--rays-per-voxel", options.rays_per_voxel, "Rays that measure each voxel's occlusion")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  command->add_option("--mesh", options.import.mesh, "glTF: bake only this mesh, in its own space")
-      ->check(CLI::Range(0, 1 << 20));
+  CLI::Option* mesh = command->add_option("--mesh", options.import.mesh, "glTF: bake only this mesh, in its own space")
+                          ->check(CLI::Range(0, 1 << 20));
+  CLI::Option* node =
+      command->add_option("--node", options.import.node, "glTF: bake only what this node and those below it show")
+          ->check(CLI::Range(0, 1 << 30))
+          ->excludes(mesh);
+  CLI::Option* scene = command
+                           ->add_flag("--scene", arguments->whole_scene,
+                                      "glTF: bake each asset of the scene, into folders in the one given by -o, as "
+                                      "render and shot do")
+                           ->excludes(mesh)
+                           ->excludes(node);
+  add_parsed_option(command, "--assemblies", arguments->assemblies, parse_assembly_rule,
+                    "With --scene, what is one asset: repeated, marked, none")
+      ->default_str(name_of(arguments->assemblies))
+      ->needs(scene);
+  command->add_option("--parent", arguments->parent, "Process to end with")->group("");  // for render and shot
   command->add_flag("--source-only", options.source_only, "Write level 0 only: the source, ready to render");
   command->add_option("--threads", arguments->threads, "0: as many as the machine has")
       ->check(CLI::Range(0, 4096))
       ->capture_default_str();
   command->add_flag("!--no-warnings", arguments->warnings,
                     "Leave what was ignored or guessed to the manifest, as render does, which says it itself");
-  command->add_option("--report", arguments->report, "Write what was done, with seconds per stage, as JSON");
+  command->add_option("--report", arguments->report, "Write what was done, with seconds per stage, as JSON")
+      ->excludes(scene);
   command->footer("Example:\n  farfield bake oak.obj.gz -o oak.farfield --finest-grid 512");
   command->callback([arguments, &action] { action = [arguments] { return run_bake(*arguments); }; });
 }

@@ -105,7 +105,11 @@ void add_evaluate_command(CLI::App& app, Action& action) {
       ->required()
       ->check(is_named);
   command->add_option("--source", arguments->source, "The model it was baked from")->required()->check(is_named);
-  command->add_option("--mesh", options.import.mesh, "glTF: the mesh that was baked")->check(CLI::Range(0, 1 << 20));
+  CLI::Option* mesh = command->add_option("--mesh", options.import.mesh, "glTF: the mesh that was baked")
+                          ->check(CLI::Range(0, 1 << 20));
+  command->add_option("--node", options.import.node, "glTF: the node that was baked with all below it")
+      ->check(CLI::Range(0, 1 << 30))
+      ->excludes(mesh);
   command->add_flag("--other-source", options.other_source,
                     "Compare with a model that it was not baked from, too; then no errors are kept");
   add_parsed_option(command, "--levels", arguments->levels, parse_level_range,

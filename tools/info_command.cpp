@@ -24,9 +24,10 @@ struct InfoArguments {
 };
 
 Result<void> info_of_asset(const InfoArguments& arguments) {
-  if (arguments.import.mesh >= 0)
+  if (arguments.import.mesh >= 0 || arguments.import.node >= 0)
     return make_error(ErrorCode::InvalidArgument,
-                      fmt::format("{}: --mesh chooses from a glTF source, this is a folder", arguments.path));
+                      fmt::format("{}: {} chooses from a glTF source, this is a folder", arguments.path,
+                                  arguments.import.mesh >= 0 ? "--mesh" : "--node"));
   FARFIELD_TRY_LET(const auto manifest, read_manifest(arguments.path));
   fmt::print("{}", arguments.as_json ? info_json(arguments.path, manifest) : info_table(arguments.path, manifest));
   return {};
@@ -61,8 +62,11 @@ void add_info_command(CLI::App& app, Action& action) {
   command->add_option("path", arguments->path, "Baked folder, or a model: OBJ, PLY, glTF or glb, gzipped or not")
       ->required()
       ->check(is_named);
-  command->add_option("--mesh", arguments->import.mesh, "glTF model: only this mesh, as for bake")
-      ->check(CLI::Range(0, 1 << 20));
+  CLI::Option* mesh = command->add_option("--mesh", arguments->import.mesh, "glTF model: only this mesh, as for bake")
+                          ->check(CLI::Range(0, 1 << 20));
+  command->add_option("--node", arguments->import.node, "glTF model: only this node and those below it, as for bake")
+      ->check(CLI::Range(0, 1 << 30))
+      ->excludes(mesh);
   command->add_flag("--json", arguments->as_json, "Print JSON");
   command->footer("Example:\n  farfield info oak.farfield\n  farfield info oak.obj.gz");
   command->callback([arguments, &action] { action = [arguments] { return run_info(*arguments); }; });

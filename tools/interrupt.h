@@ -10,4 +10,8 @@ namespace farfield::tool {
 /// the process at once. The flag lives as long as the process.
 const std::atomic<bool>& catch_interrupts();
 
+/// From now on this process gets a SIGTERM when the process `parent`, which started it, ends in any way; now, if it has
+/// ended already. 0: nothing.
+void end_with_parent(int parent);
+
 }  // namespace farfield::tool

@@ -77,6 +77,10 @@ void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::
       ->check(CLI::Range(0.001, 1e6));
   command->add_option("--exposure", options.exposure_stops, "Of the PNG previews, in stops")
       ->check(CLI::Range(-50, 50));
+  add_parsed_option(command, "--assemblies", options.assemblies, parse_assembly_rule,
+                    "What is baked as one: trees of several meshes that the scene repeats, or only what it marks, or "
+                    "nothing: repeated, marked, none")
+      ->default_str(name_of(options.assemblies));
   command->add_option("--finest-grid", options.finest_grid, "Of assets that have to be baked, a power of two")
       ->check(is_finest_grid)
       ->capture_default_str();

@@ -34,6 +34,7 @@
 #include "farfield/camera.h"
 #include "farfield/embree.h"
 #include "farfield/export.h"
+#include "farfield/instance_data.h"
 #include "farfield/interaction.h"
 #include "farfield/material.h"
 #include "farfield/ray.h"
@@ -127,8 +128,12 @@ class FARFIELD_API Runtime {
   /// the empty box: lower is infinite, upper minus infinite.
   void bounds(AssetId asset, glm::vec3& lower, glm::vec3& upper) const;
 
-  /// Adds an instance. local_to_world: affine, invertible, finite. Errors: InvalidArgument.
-  Result<InstanceId> add_instance(AssetId asset, const glm::mat4x3& local_to_world);
+  /// Adds an instance. local_to_world: affine, invertible, finite. data: for the host, see instance_data(); 24 bytes
+  /// per instance of the budget once an instance has other data than the default. Errors: InvalidArgument.
+  Result<InstanceId> add_instance(AssetId asset, const glm::mat4x3& local_to_world, const InstanceData& data = {});
+  /// What add_instance() was given for the instance that was hit; the default for what is no hit of ours. Safe from any
+  /// thread, as interaction() is.
+  InstanceData instance_data(const Interaction& interaction) const;
 
   /// The cameras of the coming frame, or of the whole shot for levels that stay the same over it. At least one before
   /// plan_frame(), unless forced_lambda is set.

@@ -28,7 +28,7 @@ from ._errors import Error
 from ._farfield import MaterialQuery
 
 __all__ = ["Asset", "Error", "MaterialQueries", "MaterialQuery", "Mesh", "bake", "bake_file", "batched", "evaluate", "info",
-           "open", "render"]
+           "open", "read_scene", "render"]
 __version__: str = _farfield.version
 
 Path = Union[str, "os.PathLike[str]"]
@@ -248,6 +248,18 @@ def evaluate(
     text = _farfield.evaluate(os.fspath(asset), "" if source is None else os.fspath(source), options, progress)
     figures: dict[str, Any] = json.loads(text)
     return figures
+
+
+def read_scene(path: Path, *, assemblies: str = "repeated", frame: float = 0) -> dict[str, Any]:
+    """What stands where in a glTF scene (docs/scene_format.md), for hosts that place baked assets themselves.
+
+    {"assets": [{"name", "folder", "node", "triangles"}], "instances": {"asset": (n,), "to_world": (n, 3, 4), "id": (n,),
+    "tint": (n, 3), "name": [...]}, "origin", "warnings"}. folder: where `farfield bake SCENE --scene -o LIBRARY` puts the
+    asset in LIBRARY. node: of the file, for assemblies; None for meshes. to_world is as the file has it less "origin",
+    which is not 0 in map coordinates only. assemblies: "repeated", "marked" or "none". frame: n / fps seconds.
+    """
+    scene: dict[str, Any] = _farfield.read_scene(os.fspath(path), assemblies, frame)
+    return scene
 
 
 def render(

@@ -4,7 +4,7 @@
 #include "import/read_formats.h"
 
 #ifdef FARFIELD_FUZZ_GLTF
-static auto read(std::span<const unsigned char> bytes) { return farfield::read_gltf(bytes, "fuzz.glb", -1); }
+static auto read(std::span<const unsigned char> bytes) { return farfield::read_gltf(bytes, "fuzz.glb", -1, -1); }
 #else
 static auto read(std::span<const unsigned char> bytes) { return farfield::FARFIELD_FUZZ_READER(bytes, "fuzz"); }
 #endif

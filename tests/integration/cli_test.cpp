@@ -83,8 +83,9 @@ const std::vector<std::string> kCommands = {"bake", "info", "verify", "evaluate"
 
 TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
   const std::vector<std::vector<std::string>> flags = {
-      {"--output", "--finest-grid", "--coarsest-grid", "--threads", "--report", "--mesh", "--source-only"},
-      {"--json", "--mesh"},
+      {"--output", "--finest-grid", "--coarsest-grid", "--threads", "--report", "--mesh", "--node", "--scene",
+       "--assemblies", "--source-only"},
+      {"--json", "--mesh", "--node"},
       {},
       {"--source", "--other-source", "--levels", "--views", "--spp", "--json", "--sheet", "--images"},
       {"--frame", "--size", "--spp", "--budget", "--assets", "--blend", "--pixel-error", "--full-detail", "--output"},
@@ -119,6 +120,8 @@ TEST(Usage, NonsenseIsOneLineThatPointsToTheHelp) {
       {"bake", "a.obj", "-o", "b", "--finest-grid", "-8"},
       {"bake", "a.obj", "-o", "b", "--threads", "-1"},
       {"bake", "a.obj", "-o", "b", "--mesh", "-2"},
+      {"bake", "a.glb", "-o", "b", "--mesh", "2", "--scene"},
+      {"bake", "a.glb", "-o", "b", "--assemblies", "all"},
       {"bake", "a.obj", "-o", "b", "c"},
       {"info"},
       {"info", "a", "b"},
@@ -512,6 +515,18 @@ TEST(Warnings, OfABrokenMeshNameItAndTheSceneIsRendered) {
   const Json report = Json::parse(contents(folder / "shot/shot.json"));
   ASSERT_EQ(report["warnings"].size(), 1u) << report["warnings"];
   EXPECT_NE(report["warnings"][0].get<std::string>().find("\"torn\""), std::string::npos);
+}
+
+TEST(SceneBake, SaysOfEachAssetHowItWentAndBakesTheOthers) {
+  const fs::path folder = fresh_folder("scene_bake");
+  const std::string scene = (folder / "scene.glb").string(), library = (folder / "assets").string();
+  write_scene_with_a_torn_mesh(scene);
+  const ProcessOutput bake = farfield({"bake", scene, "--scene", "-o", library, "--finest-grid", "16"});
+  EXPECT_EQ(bake.exit_code, 1);
+  EXPECT_EQ(bake.out, "baking whole\nready whole\nbaking torn\nfailed torn\n");
+  EXPECT_NE(bake.err.find("farfield bake: warning: torn: "), std::string::npos) << bake.err;
+  EXPECT_NE(bake.err.find("1 of its assets cannot be baked"), std::string::npos) << bake.err;
+  EXPECT_EQ(farfield({"verify", library + "/whole.farfield"}).exit_code, 0);
 }
 
 /// Warnings first, one a line, then the error.

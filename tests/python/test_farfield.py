@@ -3,6 +3,7 @@
 
 import ast
 import inspect
+import json
 import os
 import signal
 import tempfile
@@ -306,6 +307,35 @@ class Look(InAFolder):
         alpha = self.front([(self.out, away)], transparent=True, channels=["A"])[..., 0]
         np.testing.assert_allclose(alpha[:, :3], 0, atol=0.01)
         np.testing.assert_allclose(alpha[:, 5:], 1, atol=0.01)
+
+    def test_a_scene_says_what_stands_where_with_its_data(self):
+        points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+        places = np.array([[0, 0, 0], [5, 0, 0]], np.float32)
+        ids, tints = np.array([3, 4], np.uint32), np.array([[1, 0, 0], [0, 1, 0]], np.float32)
+        parts = [points, places, ids, tints]
+        (self.folder / "scene.bin").write_bytes(b"".join(part.tobytes() for part in parts))
+        offsets = np.cumsum([0] + [part.nbytes for part in parts])
+        kinds = ["VEC3", "VEC3", "SCALAR", "VEC3"]
+        scene = {
+            "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "scene": 0,
+            "nodes": [{"name": "grass", "mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {
+                "attributes": {"TRANSLATION": 1, "_ID": 2, "_TINT": 3}}}}],
+            "meshes": [{"name": "blade", "primitives": [{"attributes": {"POSITION": 0}}]}],
+            "buffers": [{"uri": "scene.bin", "byteLength": int(offsets[-1])}],
+            "bufferViews": [{"buffer": 0, "byteOffset": int(offsets[i]), "byteLength": part.nbytes}
+                            for i, part in enumerate(parts)],
+            "accessors": [{"bufferView": i, "componentType": 5125 if kinds[i] == "SCALAR" else 5126, "count": len(part),
+                           "type": kinds[i]} for i, part in enumerate(parts)],
+        }
+        (self.folder / "scene.gltf").write_text(json.dumps(scene))
+        seen = farfield.read_scene(self.folder / "scene.gltf")
+        self.assertEqual([asset["folder"] for asset in seen["assets"]], ["blade.farfield"])
+        np.testing.assert_array_equal(seen["instances"]["id"], ids)
+        np.testing.assert_array_equal(seen["instances"]["tint"], tints)
+        np.testing.assert_array_equal(seen["instances"]["to_world"][:, :, 3], places)
+        self.assertEqual(seen["instances"]["name"], ["grass", "grass"])
+        with self.assertRaises(farfield.Error):
+            farfield.read_scene(self.folder / "scene.gltf", assemblies="all")
 
     def test_refuses_what_it_cannot_show(self):
         for message, call in [

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "path_tracer/asset_library.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <fstream>
@@ -15,7 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A library with a shell script for a baker, which writes down how it was called.
+// A library with a shell script for a baker, which writes down how it was called, and says the words of `farfield
+// bake`.
 class AssetLibrary : public testing::Test {
  protected:
   AssetLibrary() {
@@ -32,12 +35,11 @@ class AssetLibrary : public testing::Test {
       scene_.instances.emplace_back();
       scene_.instances.back().mesh = mesh;
     }
-    set_baker("exit 0");
+    set_baker(kAllReady);
   }
 
   void set_baker(const std::string& last_line) {
-    test::write_text(options_.baker,
-                     "#!/bin/sh\necho \"$@\" >> " + log().string() + "\necho to standard output\n" + last_line + "\n");
+    test::write_text(options_.baker, "#!/bin/sh\necho \"$@\" >> " + log().string() + "\n" + last_line + "\n");
     fs::permissions(options_.baker, fs::perms::owner_all);
   }
   fs::path log() const { return folder_.path() / "log"; }
@@ -48,21 +50,23 @@ class AssetLibrary : public testing::Test {
     return lines;
   }
 
+  static constexpr const char* kAllReady = "echo baking maple; echo ready maple; echo baking ground; echo ready ground";
   test::TemporaryFolder folder_;
   RenderOptions options_;
   GltfScene scene_;
 };
 
-TEST_F(AssetLibrary, BakesEveryMeshThatIsShown) {
+TEST_F(AssetLibrary, OneProcessBakesEveryMeshThatIsShown) {
   const auto folders = find_or_bake_assets(scene_, options_);
   ASSERT_TRUE(folders) << folders.error().message;
   const fs::path library = folder_.path() / "baked" / "forest";
   EXPECT_EQ(*folders, (std::vector<fs::path>{library / "maple.farfield", "", "", library / "ground.farfield"}));
-  ASSERT_EQ(calls().size(), 2u);
-  const std::string call = calls()[1];
-  EXPECT_EQ(call.find("bake " + options_.scene.string() + " -o " + (library / "ground.farfield").string()), 0u);
-  EXPECT_NE(call.find("--mesh 3"), std::string::npos);
+  ASSERT_EQ(calls().size(), 1u);
+  const std::string call = calls()[0];
+  EXPECT_EQ(call.find("bake " + options_.scene.string() + " --scene -o " + library.string()), 0u) << call;
   EXPECT_NE(call.find("--finest-grid 512"), std::string::npos);
+  EXPECT_NE(call.find(fmt::format("--parent {} ", ::getpid())), std::string::npos);
+  EXPECT_NE(call.find("--assemblies repeated"), std::string::npos);
   EXPECT_EQ(call.find("--source-only"), std::string::npos);
 }
 
@@ -80,20 +84,20 @@ TEST_F(AssetLibrary, LiesBesideTheSceneByDefault) {
 }
 
 TEST_F(AssetLibrary, FailedBakeNamesTheMeshAndHowItEnded) {
-  set_baker("exit 3");
+  set_baker("echo baking maple; exit 3");
   const auto folders = find_or_bake_assets(scene_, options_);
   ASSERT_FALSE(folders);
-  EXPECT_NE(folders.error().message.find("maple"), std::string::npos);
-  EXPECT_NE(folders.error().message.find("exit code 3"), std::string::npos);
-  EXPECT_EQ(calls().size(), 1u);
-  set_baker("kill -9 $$");
-  EXPECT_NE(find_or_bake_assets(scene_, options_).error().message.find("signal 9"), std::string::npos);
+  EXPECT_NE(folders.error().message.find("mesh 0 \"maple\" failed (exit code 3)"), std::string::npos)
+      << folders.error().message;
+  set_baker("echo ready maple; echo baking ground; kill -9 $$");
+  const std::string killed = find_or_bake_assets(scene_, options_).error().message;
+  EXPECT_NE(killed.find("mesh 3 \"ground\" failed (signal 9)"), std::string::npos) << killed;
 }
 
 TEST_F(AssetLibrary, OneBrokenMeshIsAWarningAndTheOthersAreThere) {
   std::vector<std::string> warnings;
   options_.warning = [&](const std::string& line) { warnings.push_back(line); };
-  set_baker("case \"$*\" in *maple*) exit 1;; esac");
+  set_baker("echo failed maple; echo ready ground; exit 1");
   const auto folders = find_or_bake_assets(scene_, options_);
   ASSERT_TRUE(folders) << folders.error().message;
   EXPECT_EQ((*folders)[0], "");
@@ -103,11 +107,16 @@ TEST_F(AssetLibrary, OneBrokenMeshIsAWarningAndTheOthersAreThere) {
 }
 
 TEST_F(AssetLibrary, ASceneOfBrokenMeshesAloneIsAnError) {
-  set_baker("exit 1");
+  set_baker("echo failed maple; echo failed ground; exit 1");
   const auto folders = find_or_bake_assets(scene_, options_);
   ASSERT_FALSE(folders);
+  EXPECT_EQ(folders.error().code, ErrorCode::Unsupported);
   EXPECT_NE(folders.error().message.find("maple"), std::string::npos);
-  EXPECT_EQ(calls().size(), 2u);
+}
+
+TEST_F(AssetLibrary, ABakerThatSaysNothingHasBakedNothing) {
+  set_baker("exit 0");
+  EXPECT_EQ(find_or_bake_assets(scene_, options_).error().code, ErrorCode::Unsupported);
 }
 
 TEST_F(AssetLibrary, MissingBakerIsAnError) {

@@ -50,8 +50,11 @@ class Shot : public ::testing::Test {
  protected:
   Shot() {
     test::write_asset(folder_.path() / "prepared", test::white_sphere());
-    test::write_text(folder_.path() / "baker",
-                     fmt::format("#!/bin/sh\nrm -rf \"$4\" && cp -r {}/prepared \"$4\"\n", folder_.path().string()));
+    test::write_text(
+        folder_.path() / "baker",
+        fmt::format("#!/bin/sh\nfor asset in ball.farfield ball.source.farfield; do\n"
+                    "  rm -rf \"$5/$asset\" && cp -r {}/prepared \"$5/$asset\" || exit 1\ndone\necho ready ball\n",
+                    folder_.path().string()));
     std::filesystem::permissions(folder_.path() / "baker", std::filesystem::perms::owner_all);
 
     // Buffer: three positions, two times, two translations.

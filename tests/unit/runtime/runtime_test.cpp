@@ -219,6 +219,20 @@ TEST_F(RuntimeTest, InstancesNeedAnAssetAndATransformThatCanBeInverted) {
   EXPECT_EQ(second->value, 1u);
 }
 
+TEST_F(RuntimeTest, InstancesKeepTheirDataForTheHost) {
+  Host host;
+  const AssetId asset = host.add(sphere());  // instance 0, without data
+  const InstanceData data{uint64_t{1} << 40, vec3(0.5f, 1, 2)};
+  ASSERT_TRUE(host.runtime().add_instance(asset, mat4x3(1.0f), data).has_value());
+  ASSERT_TRUE(host.runtime().add_instance(asset, mat4x3(1.0f)).has_value());
+  Interaction seen;
+  EXPECT_EQ(host.runtime().instance_data(seen), InstanceData()) << "no hit";
+  for (uint32_t i = 0; i < 4; ++i) {
+    seen.instance = i;
+    EXPECT_EQ(host.runtime().instance_data(seen), i == 1 ? data : InstanceData()) << i;
+  }
+}
+
 TEST_F(RuntimeTest, AttachingAgainTakesNewInstancesAndKeepsTheId) {
   Host host;
   const AssetId asset = host.add(sphere());

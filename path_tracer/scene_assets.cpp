@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "path_tracer/scene_assets.h"
+
+#include <fmt/format.h>
+#include <malloc.h>
+
+#include <algorithm>
+#include <system_error>
+
+#include "base/result.h"
+
+namespace farfield {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::vector<size_t> numbers_in_use(const GltfScene& scene) {
+  const std::vector<bool> in_use = assets_in_use(scene);
+  std::vector<size_t> numbers;
+  for (size_t mesh = 0; mesh < in_use.size(); ++mesh)
+    if (in_use[mesh]) numbers.push_back(mesh);
+  return numbers;
+}
+
+// The stages of an asset's bake, with its name before them and its share of the whole.
+Job job_of_asset(const Job& all, const std::string& asset, size_t number, size_t count) {
+  if (!all.progress) return {{}, all.cancel};
+  const auto progress = [&all, asset, number, count](double done, const std::string& stage) {
+    all.report((static_cast<double>(number) + done) / static_cast<double>(count),
+               fmt::format("{} ({}/{}): {}", asset, number + 1, count, stage));
+  };
+  return {progress, all.cancel};
+}
+
+}  // namespace
+
+std::vector<bool> assets_in_use(const GltfScene& scene) {
+  std::vector<bool> in_use(scene.meshes.size(), false);
+  for (const GltfInstance& instance : scene.instances)
+    in_use[instance.mesh] = scene.meshes[instance.mesh].triangle_count > 0;
+  return in_use;
+}
+
+fs::path asset_folder(const SceneBakeOptions& options, const GltfMesh& mesh) {
+  return options.library / (mesh.asset_name + (options.source_only ? ".source.farfield" : ".farfield"));
+}
+
+BakeOptions asset_bake_options(const SceneBakeOptions& options, const GltfScene& scene, size_t mesh,
+                               FileHashes& hashes) {
+  BakeOptions bake;
+  bake.finest_grid = options.finest_grid;
+  bake.coarsest_grid = options.coarsest_grid;
+  bake.rays_per_voxel = options.rays_per_voxel;
+  bake.source_only = options.source_only;
+  bake.import.node = scene.meshes[mesh].node;
+  if (bake.import.node < 0) bake.import.mesh = static_cast<int>(mesh);
+  bake.import.known_hashes = &hashes;
+  return bake;
+}
+
+Result<size_t> bake_scene_assets(const SceneBakeOptions& options) {
+  FARFIELD_TRY_LET(const auto scene, read_gltf_scene(options.scene, options.assemblies));
+  for (const std::string& warning : scene.warnings)
+    if (options.warning) options.warning(warning);
+  std::error_code error;
+  fs::create_directories(options.library, error);
+  if (error)
+    return make_error(ErrorCode::Io, fmt::format("cannot create {}: {}", options.library.string(), error.message()));
+
+  size_t failed = 0;
+  FileHashes hashes;  // the scene is read once for them, however many assets it has
+  const std::vector<size_t> numbers = numbers_in_use(scene);
+  for (size_t i = 0; i < numbers.size(); ++i) {
+    const GltfMesh& mesh = scene.meshes[numbers[i]];
+    BakeOptions how = asset_bake_options(options, scene, numbers[i], hashes);
+    how.job = job_of_asset(options.job, mesh.asset_name, i, numbers.size());
+    if (options.begin) options.begin(mesh.asset_name);
+    const auto report = bake(options.scene, asset_folder(options, mesh), how);
+    if (!report && report.error().code == ErrorCode::Cancelled) return tl::unexpected(report.error());
+    if (!report) ++failed;
+    if (options.end) options.end(mesh.asset_name, report);
+    malloc_trim(0);  // the next one starts as small as in a process of its own
+  }
+  return failed;
+}
+
+}  // namespace farfield
