@@ -244,7 +244,7 @@ OrderedJson to_json(const LevelEntry& level) {
                       {"bricks", level.bricks},
                       {"resident_bytes", level.resident_bytes},
                       {"build_peak_bytes", level.build_peak_bytes}};
-  if (level.ray_cost > 0) json["ray_cost"] = level.ray_cost;
+  if (level.ray_cost != 0) json["ray_cost"] = level.ray_cost;
   if (level.errors) {
     OrderedJson errors = {{"occlusion_error", level.errors->occlusion_error}};
     add_error_size(errors, "occlusion_rms", level.errors->occlusion_rms);

@@ -16,6 +16,7 @@
 #include "base/hash.h"
 #include "base/parallel.h"
 #include "bvh/level_scene.h"
+#include "bvh/ray_cost.h"
 #include "cache/level_file.h"
 #include "tests/support/files.h"
 #include "tests/support/random_unit.h"
@@ -545,6 +546,7 @@ TEST_F(Bake, MeasuresLevelsAsTheRuntimeLoadsThemUnlessToldOtherwise) {
     ASSERT_TRUE(cost) << cost.error().message;
     EXPECT_EQ(entry.resident_bytes, cost->resident_bytes) << entry.level;
     EXPECT_EQ(entry.build_peak_bytes, cost->build_peak_bytes) << entry.level;
+    EXPECT_EQ(entry.ray_cost, ray_cost((*file)->view())) << entry.level;
   }
 }
 

@@ -116,6 +116,13 @@ Manifest textured_manifest() {
   return manifest;
 }
 
+TEST(Manifest, CostsOfRaysComeBackAndMayBeAbsent) {
+  Manifest manifest = sample_manifest();
+  EXPECT_EQ(manifest_from_json(manifest_to_json(manifest), "test")->levels[0].ray_cost, 0.0);
+  manifest.levels[0].ray_cost = 310.5;
+  EXPECT_EQ(manifest_from_json(manifest_to_json(manifest), "test")->levels[0].ray_cost, 310.5);
+}
+
 TEST(Manifest, MaterialsAndTexturesComeBack) {
   const Manifest manifest = textured_manifest();
   const Result<Manifest> read = manifest_from_json(manifest_to_json(manifest), "test");
@@ -194,6 +201,8 @@ TEST(HostileManifest, ValuesThatMakeNoSenseAreNeitherReadNorWritten) {
       {"the origin is not finite", [=](auto& m) { m.origin.z = kNan; }},
       {"base_resolution is not positive", [=](auto& m) { m.base_resolution = kNan; }},
       {"a hull point is not finite", [=](auto& m) { m.hull[1].y = static_cast<float>(kNan); }},
+      {"its ray_cost is negative", [](auto& m) { m.levels[1].ray_cost = -1; }},
+      {"its ray_cost is negative or not finite", [=](auto& m) { m.levels[1].ray_cost = kNan; }},
       {"its errors are not finite", [=](auto& m) { m.levels[1].errors->color_error = kNan; }},
       {"its errors are not finite", [=](auto& m) { m.levels[1].errors->occlusion_rms = ErrorSize::unknown(0, kNan); }},
   };
