@@ -30,6 +30,8 @@ def measure(command, report):
 
 
 def row(name, report):
+    if report is None or report["up_to_date"]:
+        return "| %s | %s | | | | | | | |" % (name, "failed" if report is None else "was there already")
     levels = report["levels"]
     stages = [report["import_seconds"]] + [sum(level["seconds"][stage] for level in levels) for stage in STAGES]
     return "| %s | %.2f | %.0f | %.0f | %s |" % (name, levels[0]["triangles"] / 1e6, report["cpu_seconds"],
@@ -52,7 +54,7 @@ def main():
         command = [arguments.farfield, "bake", str(arguments.scene), "--mesh", str(number), "-o",
                    str(folder / (name + ".farfield")), "--no-warnings", *bake_options]
         report = json.loads(path.read_text()) if path.exists() else measure(command, path)
-        print(row(name, report) if report else "| %s | failed |" % name, flush=True)
+        print(row(name, report), flush=True)
 
 
 if __name__ == "__main__":

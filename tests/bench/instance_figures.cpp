@@ -3,7 +3,6 @@
 // docs/results/scale.md.
 //
 //   build/release/bin/instance_figures ASSET.farfield [COUNT...]     without counts: 100000 and 1000000
-#include <farfield/embree.h>
 #include <farfield/runtime.h>
 #include <fmt/format.h>
 #include <time.h>
@@ -15,6 +14,8 @@
 #include <fstream>
 #include <limits>
 #include <vector>
+
+#include "base/embree.h"
 
 namespace farfield {
 namespace {
@@ -51,8 +52,8 @@ glm::mat4x3 place(size_t i, size_t count, float distance) {
   return local_to_world;
 }
 
-Result<void> measure(RTCDevice device, const char* folder, size_t count) {
-  RTCScene scene = rtcNewScene(device);
+Result<void> measure(EmbreeDeviceRef device, const char* folder, size_t count) {
+  const EmbreeScene scene = new_scene(device);
   RuntimeOptions options;
   options.budget_bytes = uint64_t{64} << 30;
   auto runtime = Runtime::create(device, options);
@@ -76,9 +77,9 @@ Result<void> measure(RTCDevice device, const char* folder, size_t count) {
   if (!plan) return tl::unexpected(plan.error());
   const double plan_seconds = planning.cpu();
   const Stopwatch committing;
-  const auto geometry = (*runtime)->attach(scene);
+  const auto geometry = (*runtime)->attach(scene.get());
   if (!geometry) return tl::unexpected(geometry.error());
-  rtcCommitScene(scene);
+  commit_scene(scene.get());
   const auto each = [&](uint64_t after, uint64_t before) {
     return static_cast<double>(after - before) / static_cast<double>(count);
   };
@@ -86,8 +87,6 @@ Result<void> measure(RTCDevice device, const char* folder, size_t count) {
              each((*runtime)->stats().accounted_bytes, accounted_before), each(resident_bytes(), rss_before),
              add_seconds, plan_seconds, committing.cpu(), committing.wall());
   std::fflush(stdout);
-  runtime->reset();
-  rtcReleaseScene(scene);
   return {};
 }
 
@@ -102,15 +101,18 @@ int main(int argc, char** argv) {
   std::vector<size_t> counts;
   for (int i = 2; i < argc; ++i) counts.push_back(std::strtoull(argv[i], nullptr, 10));
   if (counts.empty()) counts = {100'000, 1'000'000};
-  RTCDevice device = rtcNewDevice("");
+  const auto device = farfield::make_embree_device();
+  if (!device) {
+    fmt::print(stderr, "instance_figures: {}\n", device.error().message);
+    return 1;
+  }
   fmt::print(
       "| instances | accounted bytes each | RSS bytes each | add, CPU s | plan, CPU s | commit, CPU s | commit, s |\n"
       "|---|---|---|---|---|---|---|\n");
   for (const size_t count : counts) {
-    if (const auto done = farfield::measure(device, argv[1], count); !done) {
+    if (const auto done = farfield::measure(device->get(), argv[1], count); !done) {
       fmt::print(stderr, "instance_figures: {}\n", done.error().message);
       return 1;
     }
   }
-  rtcReleaseDevice(device);
 }
