@@ -27,6 +27,7 @@
 #include "base/index.h"
 #include "base/result.h"
 #include "bvh/level_scene.h"
+#include "bvh/ray_cost.h"
 #include "cache/level_file.h"
 #include "prefilter/face_materials.h"
 #include "prefilter/macrosurface.h"
@@ -331,7 +332,8 @@ class Baker {
   Result<SurfaceOrder> simplify_surface(uint32_t level, double resolution, LevelReport& level_report) {
     options_.job.report(share_done(level, 0), fmt::format("level {}: analyse", level));
     const Stopwatch analysis;
-    auto is_macrosurface = classify_macrosurface(surface_, static_cast<float>(resolution));
+    auto is_macrosurface = classify_macrosurface(surface_, static_cast<float>(resolution), options_.job);
+    if (options_.job.is_cancelled()) return cancelled();
     unwrap_walls(resolution, is_macrosurface);
     SplitSurface parts = split(surface_, is_macrosurface, sub_resolution_);
     const size_t first_shell_face = parts.macrosurface.triangles.size();
@@ -343,7 +345,9 @@ class Baker {
 
     options_.job.report(share_done(level, 0.03), fmt::format("level {}: simplify", level));
     const Stopwatch simplification;
-    const SimplifyResult simplified = simplify(parts.macrosurface, {.resolution = static_cast<float>(resolution)});
+    const SimplifyResult simplified =
+        simplify(parts.macrosurface, {.resolution = static_cast<float>(resolution)}, options_.job);
+    if (options_.job.is_cancelled()) return cancelled();
     SurfaceOrder order = order_surface(simplified.surface);
     surface_ = reorder(simplified.surface, order);
     note_shell(first_shell_face, simplified, order);
@@ -468,6 +472,7 @@ class Baker {
     entry.bricks = level.bricks.size();
     entry.resident_bytes = cost.resident_bytes;
     entry.build_peak_bytes = cost.build_peak_bytes;
+    entry.ray_cost = ray_cost(view);
     const fs::path path = workspace_.asset_dir() / entry.file;
     FARFIELD_TRY_LET(const auto bytes, write_level(path, level));
     entry.file_bytes = bytes;

@@ -369,6 +369,7 @@ LevelData pack_volume(const SparseVolume& volume) {
     level.bricks.push_back(pack_brick(volume, brick));
   }
   level.header.hot_spot = volume.hot_spot;
+  level.header.open_side = volume.open_side;
   const auto& voxels = volume.voxels;
   level.voxel_sggx = pack_each<PackedFlakeSggx>(voxels, [](const auto& v) { return pack_flake_sggx(v.sggx); });
   level.voxel_diffuse = pack_colors(voxels, [](const auto& v) { return v.diffuse; });
@@ -376,11 +377,13 @@ LevelData pack_volume(const SparseVolume& volume) {
   level.voxel_transmission = pack_colors(voxels, [](const auto& v) { return v.transmission; });
   level.voxel_self_shadowing =
       pack_each<uint8_t>(voxels, [](const auto& v) { return std::max<uint8_t>(pack_unorm8(v.self_shadowing), 1); });
+  level.voxel_octants = pack_each<PackedOctants>(voxels, [](const auto& v) { return v.octants; });
   drop_if_all(level.voxel_sggx, pack_flake_sggx(SymMat3::identity()));
   drop_if_all(level.voxel_diffuse, PackedColor{});
   drop_if_all(level.voxel_specular, PackedColor{});
   drop_if_all(level.voxel_transmission, PackedColor{});
   drop_if_all(level.voxel_self_shadowing, uint8_t{255});
+  drop_if_all(level.voxel_octants, kFullOctants);
   level.voxel_emission = pack_each<PackedRadiance>(voxels, [](const auto& v) { return pack_radiance(v.emission); });
   drop_if_all(level.voxel_emission, PackedRadiance{});
   if (!level.voxel_specular.empty()) {

@@ -5,12 +5,13 @@
 // stands for all, so that no voxel is looked at but where a tentative collision is (docs/decisions/0018).
 //
 // In bricks that are crossed, densities (1 byte per voxel) are read for every voxel, the 6 bytes of a voxel's SGGX
-// matrix only where they may matter: since lambda_max(S) = 1, rho |d| bounds the attenuation rho sqrt(d^T S d). So:
+// matrix and the 2 of its octants' shares only where they may matter: since lambda_max(S) = 1 and shares are at most 1,
+// rho |d| bounds the attenuation share rho sqrt(d^T S d). So:
 //
 //   1. fly with rho |d| until a tentative collision, in some voxel V at s_c;
-//   2. fetch S of V; the collision is real with probability sigma = sqrt(d^T S d) / |d|;
-//   3. if not, V's true attenuation is known by now: the rest of V is crossed with rho |d| sigma, and its end with a
-//      fresh optical depth for the voxels behind it.
+//   2. fetch S and shares of V; the collision is real with probability share sqrt(d^T S d) / |d|;
+//   3. if not, V's true attenuation is known by now: the rest of V is crossed with it, octant by octant, and its end
+//      with a fresh optical depth for the voxels behind it.
 //
 // Exponential flights have no memory, so steps 2 and 3 keep the distribution exact, and each voxel costs at most two
 // draws: nothing loops where rho is huge and sigma zero (flat flakes seen edge-on).
@@ -113,6 +114,7 @@ BrickVolume::BrickVolume(const LevelView& level)
     : brick_table_(level.brick_table),
       bricks_(level.bricks),
       voxel_sggx_(level.voxel_sggx),
+      voxel_octants_(level.voxel_octants),
       brick_dims_(level.header.brick_dims),
       origin_(level.header.volume_origin),
       inverse_voxel_size_(1.0f / level.header.resolution) {
@@ -135,7 +137,31 @@ void BrickVolume::find_what_is_occupied(const LevelView& level) {
 float BrickVolume::attenuation_bound() const { return voxel_sggx_.empty() ? 1.0f : kSigmaBound; }
 
 float BrickVolume::projected_area(uint32_t payload, const vec3& unit_direction) const {
+  if (voxel_sggx_.empty()) return 1.0f;
   return std::sqrt(std::max(0.0f, unpack(voxel_sggx_[payload]).quadratic(unit_direction)));
+}
+
+PackedOctants BrickVolume::octants_of(uint32_t payload) const {
+  return voxel_octants_.empty() ? kFullOctants : voxel_octants_[payload];
+}
+
+// A real collision in the rest of a voxel where a tentative one was not. rate: of a full octant, per s; entry: as the
+// flight's, from the corner of the brick.
+bool BrickVolume::cross_octants(Flight& flight, const ivec3& voxel, const vec3& entry, float rate, float s_begin,
+                                float s_end) const {
+  const PackedOctants octants = octants_of(flight.payload_hit);
+  float depth_left = flight.random.optical_depth();
+  return !walk_octants(entry, flight.direction, flight.inverse, voxel, s_begin, s_end,
+                       [&](int octant, float enter, float leave) {
+                         const float rate_here = rate * octant_share(octants, octant);
+                         const float depth = rate_here * (leave - enter);
+                         if (depth_left < depth) {
+                           flight.s_hit = enter + depth_left / rate_here;
+                           return false;
+                         }
+                         depth_left -= depth;
+                         return true;
+                       });
 }
 
 bool BrickVolume::cross_brick(Flight& flight, const Brick& brick, const ivec3& brick_cell, float s_begin,
@@ -157,14 +183,12 @@ bool BrickVolume::cross_brick(Flight& flight, const Brick& brick, const ivec3& b
       } else {
         flight.s_hit = s + flight.depth_left / rate;
         flight.payload_hit = brick.payload_index(voxel);
-        if (voxel_sggx_.empty()) return true;
-        const float acceptance = projected_area(flight.payload_hit, flight.unit_direction) / bound;
-        if (flight.random.uniform() < acceptance) return true;
-        const float depth_true = flight.random.optical_depth();
-        if (depth_true < rate * acceptance * (s_next - flight.s_hit)) {
-          flight.s_hit += depth_true / (rate * acceptance);
-          return true;
-        }
+        const float sigma = projected_area(flight.payload_hit, flight.unit_direction) / bound;
+        const vec3 entry = flight.entry - corner;
+        const int octant = octant_at(entry + flight.s_hit * flight.direction, walk.cell);
+        const float acceptance = sigma * octant_share(octants_of(flight.payload_hit), octant);
+        if (acceptance >= 1.0f || flight.random.uniform() < acceptance) return true;
+        if (cross_octants(flight, walk.cell, entry, rate * sigma, flight.s_hit, s_next)) return true;
         flight.depth_left = flight.random.optical_depth();
       }
     }
@@ -189,15 +213,15 @@ bool BrickVolume::skim_brick(Flight& flight, const Brick& brick, const ivec3& br
     s += flight.depth_left / rate;
     flight.depth_left = flight.random.optical_depth();
     const vec3 p = flight.entry + s * flight.direction - corner;
-    const int voxel = clamped_cell(p.x, kBrickSide) +
-                      kBrickSide * (clamped_cell(p.y, kBrickSide) + kBrickSide * clamped_cell(p.z, kBrickSide));
+    const ivec3 cell(clamped_cell(p.x, kBrickSide), clamped_cell(p.y, kBrickSide), clamped_cell(p.z, kBrickSide));
+    const int voxel = cell.x + kBrickSide * (cell.y + kBrickSide * cell.z);
     const float share = static_cast<float>(brick.density[static_cast<size_t>(voxel)]) * (1.0f / 255.0f);
     const float u = flight.random.uniform();
     if (!(u < share)) continue;
     flight.s_hit = s;
     flight.payload_hit = brick.payload_index(voxel);
-    if (voxel_sggx_.empty()) return true;
-    if (u * bound < share * projected_area(flight.payload_hit, flight.unit_direction)) return true;
+    const float share_here = share * octant_share(octants_of(flight.payload_hit), octant_at(p, cell));
+    if (u * bound < share_here * projected_area(flight.payload_hit, flight.unit_direction)) return true;
   }
 }
 

@@ -77,10 +77,14 @@ class BrickVolume {
   bool skim_brick(Flight& flight, const Brick& brick, const ivec3& brick_cell, float s_begin, float s_end) const;
   /// sqrt(d^T S d) / |d| of the voxel, d the ray's direction.
   float projected_area(uint32_t payload, const vec3& unit_direction) const;
+  PackedOctants octants_of(uint32_t payload) const;
+  bool cross_octants(Flight& flight, const ivec3& voxel, const vec3& entry, float rate, float s_begin,
+                     float s_end) const;
 
   ArrayView<uint32_t> brick_table_;
   ArrayView<Brick> bricks_;
   ArrayView<PackedFlakeSggx> voxel_sggx_;
+  ArrayView<PackedOctants> voxel_octants_;
   ivec3 brick_dims_{0};
   vec3 origin_{0.0f};
   float inverse_voxel_size_ = 0;

@@ -14,15 +14,16 @@ namespace farfield {
 /// What the choice needs to know of an instance.
 struct InstanceFootprint {
   float camera_footprint = 0;  ///< world units: the finest that the tessellation cameras have on it
-  float world_to_r0 = 0;       ///< lod_scale / instance scale: turns world footprints into local ones
+  float world_to_r0 = 0;       ///< pixel_error / instance scale: turns world footprints into local ones
 };
 
-/// The stored levels that lambda lies between: `slot`, and slot + 1 for the share `blend` of paths. Levels blend over
+/// The usable levels that lambda lies between: `slot`, and `coarser` for the share `blend` of paths. Levels blend over
 /// the one octave below the coarser of the two; before that, where levels are missing, the finer one serves alone.
 /// lambda is clamped to what the plan allows and to the root.
 struct SlotBlend {
   uint32_t slot;
-  float blend;  ///< in [0, 1); 0 at the root
+  uint32_t coarser;  ///< the same at the root
+  float blend;       ///< in [0, 1); 0 at the root
 };
 SlotBlend split_slots(const TracedAsset& asset, float lambda);
 
@@ -33,7 +34,7 @@ struct LevelChoice {
 };
 
 /// lambda is that of the wider of the camera's footprint on the instance and the ray's cone where it enters the
-/// instance's bounds (t_entry), no finer than the plan allows. Between two stored levels a < b the path sees b with
+/// instance's bounds (t_entry), no finer than the plan allows. Between two usable levels a < b the path sees b with
 /// probability max(0, lambda - (b - 1)), decided by path_seed and instance alone, so every ray of the path sees the
 /// same one. A ray that leaves a hit on this instance keeps that hit's level. forced_lambda replaces lambda.
 LevelChoice choose_level(const TracedAsset& asset, const InstanceFootprint& footprint, uint32_t instance,

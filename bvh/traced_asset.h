@@ -2,6 +2,7 @@
 // What rays know of an asset: its levels, those that are loaded, and which of them they may use.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -68,14 +69,16 @@ inline vec2 face_barycentric(float u, float v) { return quad_side(u, v) ? vec2(1
 struct TracedAsset {
   Box3 bounds;                ///< contains all levels with room to spare (padded_bounds), local space
   float base_resolution = 0;  ///< r_0 > 0
-  uint32_t finest_slot = 0;   ///< the plan: no ray may use a finer one
   /// Per slot: its level, null as long as none was asked for. release/acquire: whoever sees the pointer sees the level.
   std::unique_ptr<std::atomic<const TracedLevel*>[]> loaded;
-  std::vector<float> level_numbers;  ///< k of each slot, increasing
-  std::vector<vec3> hull;            ///< points whose convex hull contains all levels; empty: the corners of bounds
+  std::vector<float> level_numbers;   ///< k of each slot, increasing
+  std::vector<uint8_t> usable_slots;  ///< the plan: those that rays may use, finest first; the last is the root
+  std::vector<vec3> hull;             ///< points whose convex hull contains all levels; empty: the corners of bounds
 
   uint32_t slot_count() const { return static_cast<uint32_t>(level_numbers.size()); }
   float coarsest_number() const { return level_numbers.back(); }
+  uint32_t finest_slot() const { return usable_slots.front(); }
+  bool is_usable(uint32_t slot) const { return std::ranges::find(usable_slots, slot) != usable_slots.end(); }
 };
 
 /// The box, a little larger: so that rounding does not clip what lies on its border, also where it is flat.

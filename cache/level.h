@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/vec.h"
+#include "cache/octants.h"
 #include "scattering/sggx_codec.h"
 
 namespace farfield {
@@ -107,6 +108,7 @@ struct LevelHeader {
   ivec3 brick_dims{0};       ///< bricks along x, y, z; 0 without volume
   vec3 volume_origin{0.0f};  ///< lower corner of brick (0,0,0); voxel size is `resolution`
   float hot_spot = 0;        ///< of the volume's flakes, in [0, kStrongestHotSpot] (scattering/hot_spot.h)
+  vec3 open_side{0.0f};      ///< of the same, at most kMostOpenSide long (scattering/open_side.h)
 };
 
 /// Coordinates, in bricks, of an entry of the brick table.
@@ -157,7 +159,9 @@ inline ivec3 brick_coordinates(const LevelHeader& header, uint64_t table_index) 
   ARRAY(26, ShadingUv,          shading_uv,           vec2,              ShadingVertices) /* v down; none */         \
   ARRAY(27, ShadingColor,       shading_color,        PackedVertexColor, ShadingVertices) /* white */                 \
   /* walls made of pieces */                                                                                          \
-  ARRAY(28, FaceGap,            face_gap,             uint8_t,           Faces)         /* unorm8; 0 */
+  ARRAY(28, FaceGap,            face_gap,             uint8_t,           Faces)         /* unorm8; 0 */               \
+  /* shapes inside voxels */                                                                                          \
+  ARRAY(29, VoxelOctants,       voxel_octants,        PackedOctants,     Voxels)        /* shares of density; full */
 // clang-format on
 
 /// The arrays, owned (Array = std::vector<T>) while baking, or as spans into a mapped file at run time.

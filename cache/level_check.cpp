@@ -10,6 +10,7 @@
 
 #include "cache/level_format.h"
 #include "scattering/hot_spot.h"
+#include "scattering/open_side.h"
 
 namespace farfield {
 
@@ -31,6 +32,8 @@ Problem check_header(const LevelView& level) {
   if (!is_finite(header.volume_origin)) return "the volume's origin is not finite";
   if (!(header.hot_spot >= 0 && header.hot_spot <= kStrongestHotSpot))
     return fmt::format("the hot spot's strength is {}", header.hot_spot);
+  if (!(glm::length(header.open_side) <= kMostOpenSide * 1.001f))
+    return fmt::format("the open side is ({}, {}, {})", header.open_side.x, header.open_side.y, header.open_side.z);
   if (!level.has_surface() && !level.has_volume()) return "it has neither surface nor volume";
   return {};
 }

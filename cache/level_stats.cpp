@@ -15,14 +15,18 @@ double ratio(double a, double b, double otherwise) { return b > 0 ? a / b : othe
 void add_densities(const LevelView& level, LevelStats& stats) {
   double sum = 0;
   for (const Brick& brick : level.bricks) {
-    uint64_t brick_sum = 0;
+    double brick_sum = 0;
     uint8_t brick_max = 0;
+    uint32_t payload = brick.payload_base;
     for (const uint8_t density : brick.density) {
-      brick_sum += density;
+      if (density == 0) continue;
+      const float share = level.voxel_octants.empty() ? 1.0f : mean_share(level.voxel_octants[payload]);
+      brick_sum += static_cast<double>(density) * static_cast<double>(share);
       brick_max = std::max(brick_max, density);
+      ++payload;
     }
     const double unit = static_cast<double>(brick.density_scale) / 255.0;
-    sum += static_cast<double>(brick_sum) * unit;
+    sum += brick_sum * unit;
     stats.max_density = std::max(stats.max_density, brick_max * unit);
   }
   stats.mean_density = ratio(sum, static_cast<double>(stats.voxels), 0.0);

@@ -63,6 +63,7 @@ Problem find_level_problem(const LevelEntry& level) {
   for (const uint64_t count : {level.triangles, level.voxels, level.bricks}) {
     if (count > kMaxElements) return fmt::format("{} elements are more than any level has", count);
   }
+  if (!std::isfinite(level.ray_cost) || level.ray_cost < 0) return "its ray_cost is negative or not finite";
   if (level.errors) {
     if (!are_finite(*level.errors)) return "its errors are not finite";
   }
@@ -162,6 +163,7 @@ LevelEntry level_from_json(const Json& json, const std::string& where, FieldRead
   level.bricks = read.count(json, "bricks", where);
   level.resident_bytes = read.count(json, "resident_bytes", where);
   level.build_peak_bytes = read.count(json, "build_peak_bytes", where);
+  if (json.is_object() && json.contains("ray_cost")) level.ray_cost = read.number(json, "ray_cost", where);
   if (json.is_object() && json.contains("errors")) {
     level.errors = errors_from_json(json["errors"], where + ".errors", read);
   }
@@ -242,6 +244,7 @@ OrderedJson to_json(const LevelEntry& level) {
                       {"bricks", level.bricks},
                       {"resident_bytes", level.resident_bytes},
                       {"build_peak_bytes", level.build_peak_bytes}};
+  if (level.ray_cost > 0) json["ray_cost"] = level.ray_cost;
   if (level.errors) {
     OrderedJson errors = {{"occlusion_error", level.errors->occlusion_error}};
     add_error_size(errors, "occlusion_rms", level.errors->occlusion_rms);

@@ -15,6 +15,7 @@
 #include "base/result.h"
 #include "cache/manifest.h"
 #include "path_tracer/asset_library.h"
+#include "path_tracer/budget_notice.h"
 #include "path_tracer/film.h"
 #include "path_tracer/render_session.h"
 #include "path_tracer/scene_setup.h"
@@ -31,7 +32,7 @@ constexpr uint64_t kMostManifestBytes = 16 << 20;
 
 // Goes up when the same scene, assets and options come to give other pictures, so that a shot that was begun before
 // does not go on with frames that look otherwise.
-constexpr int kLooksVersion = 4;
+constexpr int kLooksVersion = 5;
 
 // A file's name, size and time of change: enough to see that it is another one.
 std::string identity(const fs::path& path) {
@@ -51,11 +52,11 @@ std::string make_fingerprint(const RenderOptions& options, std::span<const fs::p
   const TraceOptions& trace = options.trace;
   std::string text = fmt::format(
       "farfield {} looks {} size {}x{} spp {} seed {} depth {} roulette {} clamp {} strategy {} transparent {} budget "
-      "{} scale {} blend {} "
+      "{} pixel error {} blend {} "
       "full {} exposure {} cryptomatte {} camera {} fps {} scene {} environment {} sky {} assets",
       FARFIELD_VERSION, kLooksVersion, options.width, options.height, trace.samples_per_pixel, trace.seed,
       trace.max_depth, trace.roulette_depth, trace.clamp_indirect, static_cast<int>(trace.strategy), trace.transparent,
-      options.budget_bytes, options.lod_scale, static_cast<int>(options.blend), options.full_detail,
+      options.budget_bytes, options.pixel_error, static_cast<int>(options.blend), options.full_detail,
       options.exposure_stops, options.cryptomatte, options.camera, options.frames_per_second, identity(options.scene),
       identity(options.environment), options.sky);
   for (const fs::path& folder : asset_folders)
@@ -74,7 +75,7 @@ Metadata frame_metadata(const RenderOptions& options, const GltfScene& scene, co
       {"farfield.budget", fmt::format("{}", options.budget_bytes)},
       {"farfield.frame", frame},
       {"farfield.full_detail", options.full_detail ? 1 : 0},
-      {"farfield.lod_scale", options.lod_scale},
+      {"farfield.pixel_error", options.pixel_error},
       {"farfield.scene", options.scene.filename().string()},
       {"farfield.seed", fmt::format("{}", options.trace.seed)},
       {"farfield.spp", options.trace.samples_per_pixel},
@@ -188,6 +189,8 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     if (auto taken = sink(film.image(), metadata, report); !taken) return tl::unexpected(taken.error());
   }
   report.peak_rss_bytes = memory.peak_bytes();
+  if (const auto notice = budget_notice(report)) options_.warning(*notice);
+  report.warnings = warnings_->lines();
   return report;
 }
 

@@ -28,7 +28,7 @@ struct RenderOptions {
   uint64_t budget_bytes = uint64_t{4} << 30;
   /// Folder of baked assets: ASSETS/SCENE/MESH.farfield for each mesh. Empty: "farfield-assets" beside the scene.
   std::filesystem::path assets;
-  float lod_scale = 1.0f;
+  float pixel_error = 1.0f;  ///< RuntimeOptions::pixel_error
   Blend blend = Blend::Dissolve;
   bool full_detail = false;           ///< level 0 only, from assets baked with --source-only
   std::filesystem::path environment;  ///< EXR or Radiance HDR; empty: sun and sky, see make_lights()
@@ -57,7 +57,9 @@ struct FrameReport {
   uint64_t rays = 0;
   uint64_t invalid_samples = 0;        ///< paths whose value was not finite; black in the image
   double bias = 0;                     ///< PlanSummary::bias
+  uint64_t asked_bytes = 0;            ///< a budget that would give nothing up
   std::vector<uint32_t> finest_level;  ///< per asset of RenderReport::assets: finest level that rays may use
+  std::vector<float> levels_given_up;  ///< per asset: how many levels coarser than asked, for the budget's sake
 };
 
 struct RenderReport {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "path_tracer/render_session.h"
 
+#include <malloc.h>
+
 #include <chrono>
 
 #include "base/process_memory.h"
@@ -14,7 +16,7 @@ RuntimeOptions runtime_options(const RenderOptions& options) {
   RuntimeOptions runtime;
   runtime.budget_bytes = options.budget_bytes;
   runtime.blend = options.blend;
-  runtime.lod_scale = options.lod_scale;
+  runtime.pixel_error = options.pixel_error;
   if (options.full_detail) runtime.forced_lambda = 0.0f;
   runtime.messages = [message = options.message, warning = options.warning](Severity severity,
                                                                             const std::string& text) {
@@ -59,6 +61,7 @@ Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& li
   runtime_->set_cameras({camera.tessellation()});
   FARFIELD_TRY_LET(auto plan, runtime_->plan_frame());
   runtime_->prefetch();
+  malloc_trim(0);  // what writing the last frame left in the heap is not the assets'
 
   const TraceScene scene{scene_.get(), runtime_.get(), &lights, &ids_};
   FARFIELD_TRY_LET(const auto traced, path_trace(scene, camera, options.trace, film, job));
@@ -74,7 +77,9 @@ Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& li
   report.rays = traced.rays;
   report.invalid_samples = traced.invalid_samples;
   report.bias = plan.bias;
+  report.asked_bytes = plan.asked_bytes;
   report.finest_level = std::move(plan.finest_level);
+  report.levels_given_up = std::move(plan.levels_given_up);
   return report;
 }
 

@@ -12,21 +12,27 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
+template <typename T>
+Json by_asset(const std::vector<std::string>& assets, const std::vector<T>& values) {
+  Json json = Json::object();
+  for (size_t i = 0; i < std::min(assets.size(), values.size()); ++i) json[assets[i]] = values[i];
+  return json;
+}
+
 Json frame_to_json(const FrameReport& frame, const std::vector<std::string>& assets) {
-  Json levels = Json::object();
-  for (size_t i = 0; i < std::min(assets.size(), frame.finest_level.size()); ++i)
-    levels[assets[i]] = frame.finest_level[i];
   return {{"frame", frame.frame},
           {"seconds", frame.seconds},
           {"load_seconds", frame.load_seconds},
           {"accounted_bytes", frame.accounted_bytes},
           {"rss_bytes", frame.rss_bytes},
           {"bias", frame.bias},
+          {"asked_bytes", frame.asked_bytes},
           {"rays", frame.rays},
           {"levels_loaded", frame.levels_loaded},
           {"fallbacks", frame.fallbacks},
           {"invalid_samples", frame.invalid_samples},
-          {"finest_level", levels}};
+          {"finest_level", by_asset(assets, frame.finest_level)},
+          {"levels_given_up", by_asset(assets, frame.levels_given_up)}};
 }
 
 FrameReport frame_from_json(const Json& json, const std::vector<std::string>& assets) {
@@ -37,12 +43,15 @@ FrameReport frame_from_json(const Json& json, const std::vector<std::string>& as
   json.at("accounted_bytes").get_to(frame.accounted_bytes);
   json.at("rss_bytes").get_to(frame.rss_bytes);
   json.at("bias").get_to(frame.bias);
+  json.at("asked_bytes").get_to(frame.asked_bytes);
   json.at("rays").get_to(frame.rays);
   json.at("levels_loaded").get_to(frame.levels_loaded);
   json.at("fallbacks").get_to(frame.fallbacks);
   json.at("invalid_samples").get_to(frame.invalid_samples);
-  for (const std::string& asset : assets)
+  for (const std::string& asset : assets) {
     frame.finest_level.push_back(json.at("finest_level").at(asset).get<uint32_t>());
+    frame.levels_given_up.push_back(json.at("levels_given_up").at(asset).get<float>());
+  }
   return frame;
 }
 

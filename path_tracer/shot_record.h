@@ -16,8 +16,9 @@ struct ShotRecord {
 };
 
 /// {"budget_bytes", "baseline_rss_bytes", "peak_rss_bytes", "peak_accounted_bytes", "fingerprint", "assets": [...],
-/// "warnings": [...], "frames": [{"frame", "seconds", "load_seconds", "accounted_bytes", "rss_bytes", "bias", "rays",
-/// "levels_loaded", "fallbacks", "invalid_samples", "finest_level": {asset: k}}]}, indented, keys in this order, frames
+/// "warnings": [...], "frames": [{"frame", "seconds", "load_seconds", "accounted_bytes", "rss_bytes", "bias",
+/// "asked_bytes", "rays", "levels_loaded", "fallbacks", "invalid_samples", "finest_level": {asset: k},
+/// "levels_given_up": {asset: levels}}]}, indented, keys in this order, frames
 /// ascending.
 std::string to_json(const ShotRecord& record);
 

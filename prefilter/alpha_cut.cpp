@@ -5,8 +5,9 @@
 //   |\                 2. sample alpha on a triangular lattice; marching triangles gives directed segments with the
 //   |  \               inside on their left; they chain into closed loops, along the triangle's border where the
 //   |####\             inside touches it (counter-clockwise loops are outlines, clockwise ones holes)
-//   |#####>\           3. straighten the loops [Douglas and Peucker 1973]; crossings on the border stay where they are
-//   A--##----B         4. fill them by a sweep line, flip edges to Delaunay
+//   |#####>\           3. straighten the loops [Douglas and Peucker 1973]; crossings
+//   A--##----B            on the border stay where they are, the others give their loop its area back
+//                      4. fill them by a sweep line, flip edges to Delaunay
 //
 // All loops live in lattice coordinates (s, t): the point A + s (B - A) + t (C - A).
 #include "prefilter/alpha_cut.h"
@@ -15,6 +16,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <utility>
 
 #include "base/index.h"
 #include "prefilter/fill_rings.h"
@@ -25,7 +27,6 @@ namespace {
 using glm::dvec2;
 
 constexpr double kAreaTolerance = 0.004;  // of the covered area: four times tighter than promised of whole textures
-constexpr double kCoarsestTexels = 3.5;   // first tolerance of the straightening, in texels
 constexpr double kFinestTexels = 0.1;     // last one before the outline is taken as it is
 
 /// The triangle in sorted order, with alpha as a function of the lattice.
@@ -233,14 +234,14 @@ double distance_to_segment(const dvec2& p, const dvec2& a, const dvec2& b) {
   return glm::length(p - (a + t * ab));
 }
 
-/// Marks which of loop[begin .. end] (indices modulo its size) to keep, besides the two ends.
-void straighten_run(const std::vector<dvec2>& texels, size_t begin, size_t end, double tolerance,
+/// Marks which of loop[begin .. end] (indices modulo its size) to keep, besides the two ends; at least one if asked.
+void straighten_run(const std::vector<dvec2>& texels, size_t begin, size_t end, double tolerance, bool keeps_one,
                     std::vector<bool>& keep) {
   std::vector<std::pair<size_t, size_t>> stack{{begin, end}};
   while (!stack.empty()) {
     const auto [a, b] = stack.back();
     stack.pop_back();
-    double farthest = tolerance;
+    double farthest = std::exchange(keeps_one, false) ? -1 : tolerance;
     size_t split = a;
     for (size_t k = a + 1; k < b; ++k) {
       const double d =
@@ -255,6 +256,12 @@ void straighten_run(const std::vector<dvec2>& texels, size_t begin, size_t end, 
     stack.push_back({a, split});
     stack.push_back({split, b});
   }
+}
+
+/// Whether a straight line between two points would lie on the triangle's border.
+bool are_on_one_side(const dvec2& a, const dvec2& b) {
+  const auto is_far = [](const dvec2& p) { return std::abs(p.x + p.y - 1) < 1e-12; };
+  return (a.x == 0 && b.x == 0) || (a.y == 0 && b.y == 0) || (is_far(a) && is_far(b));
 }
 
 Loop straighten(const Loop& loop, const TexelMetric& metric, double tolerance) {
@@ -278,7 +285,10 @@ Loop straighten(const Loop& loop, const TexelMetric& metric, double tolerance) {
   for (size_t a = 0; a < anchors.size(); ++a) {
     const size_t begin = anchors[a], end = a + 1 < anchors.size() ? anchors[a + 1] : anchors[0] + n;
     keep[begin] = true;
-    straighten_run(texels, begin, end, tolerance, keep);
+    // What touches the border keeps some width there, as narrow as it may be: the neighbour has the other half of it.
+    const LoopPoint &from = loop[begin % n], &to = loop[end % n];
+    const bool keeps_one = from.is_fixed && to.is_fixed && are_on_one_side(from.at, to.at);
+    straighten_run(texels, begin, end, tolerance, keeps_one, keep);
   }
   Loop out;
   for (size_t k = 0; k < n; ++k) {
@@ -294,6 +304,32 @@ double twice_area(const Loop& loop) {
     sum += a.x * b.y - a.y * b.x;
   }
   return sum;
+}
+
+/// Keeps a point that is not on the triangle's border off it.
+dvec2 within_triangle(dvec2 p) {
+  constexpr double kMargin = 1e-6;
+  p = glm::max(p, kMargin);
+  const double over = p.x + p.y - (1 - kMargin);
+  return over > 0 ? glm::max(p - 0.5 * over, kMargin) : p;
+}
+
+/// Straightening takes from what bulges out and adds to what bulges in. Moves the free points of the straightened loop
+/// perpendicularly to their neighbours until it has the area of the loop before.
+void restore_area(const Loop& before, Loop& loop) {
+  std::vector<dvec2> gradient(loop.size(), dvec2(0.0));  // of twice the area
+  double norm2 = 0;
+  for (size_t k = 0; k < loop.size(); ++k) {
+    if (loop[k].is_fixed) continue;
+    const dvec2 across = loop[(k + 1) % loop.size()].at - loop[(k + loop.size() - 1) % loop.size()].at;
+    gradient[k] = {across.y, -across.x};
+    norm2 += glm::dot(across, across);
+  }
+  if (!(norm2 > 0)) return;
+  const double step = (twice_area(before) - twice_area(loop)) / norm2;
+  for (size_t k = 0; k < loop.size(); ++k) {
+    if (!loop[k].is_fixed) loop[k].at = within_triangle(loop[k].at + step * gradient[k]);
+  }
 }
 
 double twice_area(const std::vector<Loop>& loops) {
@@ -383,12 +419,16 @@ void flip_to_delaunay(Filling& filling, const TexelMetric& metric) {
 
 /// The loops straightened as much as their area allows, and filled. The first tolerance for which the area and the
 /// filling are right wins.
-Filling fill_straightened(const std::vector<Loop>& loops, const TexelMetric& metric) {
+Filling fill_straightened(const std::vector<Loop>& loops, const TexelMetric& metric, double coarsest_texels) {
   const double area = twice_area(loops);
-  for (double tolerance = kCoarsestTexels; tolerance >= kFinestTexels; tolerance *= 0.75) {
+  for (double tolerance = coarsest_texels; tolerance >= kFinestTexels; tolerance *= 0.75) {
     std::vector<Loop> straight;
-    for (const Loop& loop : loops) straight.push_back(straighten(loop, metric, tolerance));
-    std::erase_if(straight, [](const Loop& loop) { return loop.size() < 3; });
+    for (const Loop& loop : loops) {
+      Loop straightened = straighten(loop, metric, tolerance);
+      if (straightened.size() < 3) continue;
+      restore_area(loop, straightened);
+      straight.push_back(std::move(straightened));
+    }
     if (std::abs(twice_area(straight) - area) > kAreaTolerance * area) continue;
     Filling filling = fill(straight);
     // A straightened loop might cross another one: then the triangles overlap and their area gives it away.
@@ -450,7 +490,19 @@ int cut_subdivisions(const SourceMaterial& material, std::span<const MaskedTrian
   return subdivisions;
 }
 
-CutPattern cut_by_mask(const SourceMaterial& material, const MaskedTriangle& triangle, int subdivisions) {
+double texel_size(const SourceMaterial& material, const MaskedTriangle& triangle, const std::array<vec3, 3>& corners) {
+  double largest = 0;
+  if (!is_usable(triangle.uv)) return 0;
+  for (size_t k = 0; k < 3; ++k) {
+    const dvec2 texels = dvec2(triangle.uv[(k + 1) % 3] - triangle.uv[k]) * texture_size(material);
+    if (glm::length(texels) < 1e-3) return 0;
+    largest = std::max(largest, glm::length(dvec3(corners[(k + 1) % 3]) - dvec3(corners[k])) / glm::length(texels));
+  }
+  return largest;
+}
+
+CutPattern cut_by_mask(const SourceMaterial& material, const MaskedTriangle& triangle, int subdivisions,
+                       double tolerance_texels) {
   if (!is_usable(triangle.uv)) return whole_triangle();
   const Sorted sorted = sort_corners(triangle);
   const Lattice lattice(material, sorted.corners, subdivisions);
@@ -465,7 +517,7 @@ CutPattern cut_by_mask(const SourceMaterial& material, const MaskedTriangle& tri
   // Without area in UV space (alpha then comes from vertices or along a line), measure in units of the triangle.
   if (std::abs(metric.ds.x * metric.dt.y - metric.ds.y * metric.dt.x) < 1e-6) metric = {dvec2(64, 0), dvec2(0, 64)};
 
-  Filling filling = fill_straightened(loops, metric);
+  Filling filling = fill_straightened(loops, metric, tolerance_texels);
   flip_to_delaunay(filling, metric);
   CutPattern out;
   for (const dvec2& p : filling.points) out.vertices.push_back(to_barycentric(p, sorted.order));

@@ -30,9 +30,17 @@ struct CutPattern {
 /// [1, 1024], the same for all triangles of a material, or their cuts would not fit.
 int cut_subdivisions(const SourceMaterial& material, std::span<const MaskedTriangle> triangles);
 
+/// How far outlines may be straightened where nothing says how large a texel is, in texels.
+inline constexpr double kOutlineTexels = 3.5;
+
+/// The largest extent of a texel on a triangle with these corners: along its edges, in their unit. 0: not known, for
+/// coordinates that span no texel.
+double texel_size(const SourceMaterial& material, const MaskedTriangle& triangle, const std::array<vec3, 3>& corners);
+
 /// Cuts along alpha = material.alpha_cutoff. The outline is found by marching triangles on a lattice of
-/// subdivisions^2 small triangles, straightened as far as the covered area stays within 0.5 %, and filled with
-/// triangles. Unusable texture coordinates leave the triangle whole.
-CutPattern cut_by_mask(const SourceMaterial& material, const MaskedTriangle& triangle, int subdivisions);
+/// subdivisions^2 small triangles, straightened by up to `tolerance_texels` as far as the covered area stays within
+/// 0.5 %, and filled with triangles. Unusable texture coordinates leave the triangle whole.
+CutPattern cut_by_mask(const SourceMaterial& material, const MaskedTriangle& triangle, int subdivisions,
+                       double tolerance_texels = kOutlineTexels);
 
 }  // namespace farfield

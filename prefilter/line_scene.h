@@ -78,18 +78,53 @@ struct LinePass {
 Result<void> for_lines(const LineScene& scene, const LinePass& pass,
                        const std::function<void(const SeenLine&, SplitMix&)>& body);
 
-/// sigma_t of a voxel along a unit direction, in 1 / scene unit.
-inline double sigma_of(const Voxel& voxel, const vec3& direction) {
-  return static_cast<double>(voxel.density) * std::sqrt(std::max(0.0f, voxel.sggx.quadratic(direction)));
+/// sqrt(w^T S w) of a voxel along a unit direction w.
+inline double projected_area(const Voxel& voxel, const vec3& direction) {
+  return std::sqrt(std::max(0.0f, voxel.sggx.quadratic(direction)));
 }
 
-/// Calls visit(number of the voxel, optical depth there) along a ray through a volume with this grid.
+/// sigma_t of a voxel's full octants along a unit direction, in 1 / scene unit.
+inline double sigma_of(const Voxel& voxel, const vec3& direction) {
+  return static_cast<double>(voxel.density) * projected_area(voxel, direction);
+}
+
+/// An octant of a voxel along a ray.
+struct OctantStretch {
+  uint32_t voxel;
+  int octant;
+  double enter, leave;  ///< along the ray, in voxels
+};
+
+/// Calls visit(OctantStretch) for the octants of stored voxels along a ray, in order, while it returns true.
 template <typename Visit>
-void visit_depths(const SparseVolume& volume, const VoxelGrid& grid, const VoxelRay& ray, Visit&& visit) {
+void walk_octants(const VoxelGrid& grid, const VoxelRay& ray, Visit&& visit) {
+  const dvec3 inverse = 1.0 / ray.direction;
+  grid.walk(ray, [&](uint32_t number, double enter, double leave) {
+    const ivec3 cell(glm::floor(ray.origin + 0.5 * (enter + leave) * ray.direction));
+    return walk_octants(ray.origin, ray.direction, inverse, cell, enter, leave,
+                        [&](int octant, double from, double to) {
+                          return visit(OctantStretch{number, octant, from, to});
+                        });
+  });
+}
+
+/// Calls visit(octant, its optical depth) along a ray through a volume with this grid, in order, while it returns true.
+template <typename Visit>
+void walk_octant_depths(const SparseVolume& volume, const VoxelGrid& grid, const VoxelRay& ray, Visit&& visit) {
   const vec3 direction(ray.direction);
   const double size = volume.lattice.voxel_size;
-  grid.walk(ray, [&](uint32_t number, double enter, double leave) {
-    visit(number, (leave - enter) * size * sigma_of(volume.voxels[number], direction));
+  walk_octants(grid, ray, [&](const OctantStretch& at) {
+    const Voxel& voxel = volume.voxels[at.voxel];
+    const double share = octant_share(voxel.octants, at.octant);
+    return visit(at, (at.leave - at.enter) * size * share * sigma_of(voxel, direction));
+  });
+}
+
+/// Calls visit(number of the voxel, optical depth of one of its octants) along a ray.
+template <typename Visit>
+void visit_depths(const SparseVolume& volume, const VoxelGrid& grid, const VoxelRay& ray, Visit&& visit) {
+  walk_octant_depths(volume, grid, ray, [&](const OctantStretch& at, double depth) {
+    visit(at.voxel, depth);
     return true;
   });
 }

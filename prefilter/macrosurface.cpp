@@ -8,6 +8,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
+#include <span>
+#include <utility>
 
 #include "base/index.h"
 #include "base/parallel.h"
@@ -24,6 +27,10 @@ constexpr size_t kMaxExploredFaces = size_t{1} << 18;
 
 /// One answer serves the faces around a point within this fraction of the resolution.
 constexpr double kPatchRadius = 0.125;
+
+/// Explorations cross blocks of this fraction of the resolution in one step: the ball is wide against them, and they
+/// are wide against many faces.
+constexpr double kBlockRadius = 0.0625;
 
 /// Length of a triangle's longest edge over the height on it, above which the middle of that edge represents the
 /// triangle better than its centre of mass (thesis 7.2.2). The halves of a square have 2: both are judged from the
@@ -87,101 +94,7 @@ class ComponentCounter {
   int components_ = 0;
 };
 
-/// Evaluates the criterion of 7.1.2. Keeps its scratch memory between calls; one thread at a time.
-class BallExplorer {
- public:
-  BallExplorer(const Surface& surface, const EdgeTable& edges, double radius)
-      : surface_(surface), edges_(edges), radius2_(radius * radius) {}
-
-  bool is_on_macrosurface(uint32_t face) {
-    center_ = evaluation_point(surface_, face);
-    if (!touches_edges(face)) return true;  // the curve is a circle within the face
-    curve_.clear();
-    explored_.clear();
-    explored_.insert(face);
-    for (uint32_t i = 0; i < explored_.size(); ++i) {
-      explore(explored_.key(i));
-      if (explored_.size() > kMaxExploredFaces) return false;
-    }
-    return curve_.components() == 1;
-  }
-
- private:
-  /// Where an edge meets the ball, seen from its smaller to its larger vertex.
-  struct EdgeCut {
-    bool touches = false;  ///< some of it lies inside
-    bool enters = false;   ///< the sphere is crossed from outside to inside: node 2 * edge
-    bool leaves = false;   ///< and from inside to outside: node 2 * edge + 1
-  };
-
-  bool is_inside(uint32_t vertex) const {
-    const dvec3 offset = dvec3(surface_.positions[vertex]) - center_;
-    return glm::dot(offset, offset) <= radius2_;
-  }
-
-  EdgeCut cut(uint32_t edge) const {
-    return cut(edge, is_inside(edges_.smaller_vertex[edge]), is_inside(edges_.larger_vertex[edge]));
-  }
-
-  EdgeCut cut(uint32_t edge, bool a_inside, bool b_inside) const {
-    const uint32_t a = edges_.smaller_vertex[edge], b = edges_.larger_vertex[edge];
-    if (a_inside || b_inside) return {true, !a_inside, !b_inside};
-    const dvec3 origin = dvec3(surface_.positions[a]) - center_;
-    const dvec3 direction = dvec3(surface_.positions[b]) - dvec3(surface_.positions[a]);
-    const double length2 = glm::dot(direction, direction);
-    const double along = -glm::dot(origin, direction);
-    if (!(along > 0 && along < length2)) return {};
-    const dvec3 nearest = origin + direction * (along / length2);
-    const bool is_cut = glm::dot(nearest, nearest) < radius2_;
-    return {is_cut, is_cut, is_cut};
-  }
-
-  bool touches_edges(uint32_t face) const {
-    const uvec3& e = edges_.face_edges[face];
-    return cut(e.x).touches || cut(e.y).touches || cut(e.z).touches;
-  }
-
-  /// Adds the face's arcs to the curve, and its neighbours through edges that touch the ball to the exploration.
-  void explore(uint32_t face) {
-    // The part of a triangle inside a ball is convex. So along the triangle's boundary, where it leaves the ball an arc
-    // begins, and that arc ends where the boundary next enters again.
-    struct Crossing {
-      uint32_t node;
-      bool enters;
-    };
-    const uvec3& corners = surface_.triangles[face];
-    const std::array<bool, 3> inside = {is_inside(corners.x), is_inside(corners.y), is_inside(corners.z)};
-    std::array<Crossing, 6> crossings;
-    size_t count = 0;
-    for (int c = 0; c < 3; ++c) {
-      const uint32_t edge = edges_.face_edges[face][c];
-      const bool forward = corners[c] == edges_.smaller_vertex[edge];
-      const bool starts_inside = inside[static_cast<size_t>(c)];
-      const bool ends_inside = inside[static_cast<size_t>(next_corner(c))];
-      const EdgeCut edge_cut = forward ? cut(edge, starts_inside, ends_inside) : cut(edge, ends_inside, starts_inside);
-      if (!edge_cut.touches) continue;
-      for (const uint32_t neighbour : edges_.faces_of(edge)) {
-        if (neighbour != face) explored_.insert(neighbour);
-      }
-      const Crossing at_enter{2 * edge, forward}, at_leave{2 * edge + 1, !forward};
-      if (forward && edge_cut.enters) crossings[count++] = at_enter;
-      if (edge_cut.leaves) crossings[count++] = at_leave;
-      if (!forward && edge_cut.enters) crossings[count++] = at_enter;
-    }
-    for (size_t i = 0; i < count; ++i) {
-      if (!crossings[i].enters) curve_.link(crossings[i].node, crossings[(i + 1) % count].node);
-    }
-  }
-
-  const Surface& surface_;
-  const EdgeTable& edges_;
-  const double radius2_;
-  dvec3 center_{0.0};
-  IndexMap explored_;
-  ComponentCounter curve_;
-};
-
-/// A face that answers for those around it, and which faces those are.
+/// A face that stands for those around it, and which faces those are.
 struct Patches {
   std::vector<uint32_t> seeds;          ///< per patch
   std::vector<uint32_t> patch_of_face;  ///< per face
@@ -220,6 +133,200 @@ Patches make_patches(const Surface& surface, const EdgeTable& edges, double radi
   }
   return patches;
 }
+
+/// A part of the surface that lies within a ball, and where it goes on.
+struct Blocks {
+  std::vector<uint32_t> block_of_face;  ///< per face
+  std::vector<uint32_t> face_count;     ///< per block
+  std::vector<dvec3> center;            ///< per block: of a ball around all corners of its faces
+  std::vector<double> radius;           ///< per block: of that ball
+  std::vector<uint32_t> first_outside;  ///< per block, and one past the last: where its faces begin in `outside`
+  std::vector<uint32_t> outside;        ///< faces of other blocks that share an edge with one of the block
+
+  std::span<const uint32_t> outside_of(uint32_t block) const {
+    return std::span(outside).subspan(first_outside[block], first_outside[block + 1] - first_outside[block]);
+  }
+};
+
+/// Calls visit(face, neighbour) for each pair of faces of different blocks that share an edge, both ways.
+template <typename Visit>
+void for_each_border(const EdgeTable& edges, const std::vector<uint32_t>& block_of_face, Visit&& visit) {
+  for (uint32_t edge = 0; edge < edges.size(); ++edge) {
+    for (const uint32_t face : edges.faces_of(edge)) {
+      for (const uint32_t neighbour : edges.faces_of(edge)) {
+        if (block_of_face[face] != block_of_face[neighbour]) visit(face, neighbour);
+      }
+    }
+  }
+}
+
+Blocks make_blocks(const Surface& surface, const EdgeTable& edges, double radius) {
+  Patches patches = make_patches(surface, edges, radius);
+  Blocks blocks;
+  blocks.block_of_face = std::move(patches.patch_of_face);
+  for (const uint32_t seed : patches.seeds) blocks.center.push_back(evaluation_point(surface, seed));
+  blocks.face_count.assign(blocks.center.size(), 0);
+  blocks.radius.assign(blocks.center.size(), 0);
+  for (uint32_t face = 0; face < blocks.block_of_face.size(); ++face) {
+    const uint32_t block = blocks.block_of_face[face];
+    ++blocks.face_count[block];
+    for (int c = 0; c < 3; ++c) {
+      const double distance = glm::length(corner_position(surface, face, c) - blocks.center[block]);
+      blocks.radius[block] = std::max(blocks.radius[block], distance);
+    }
+  }
+  blocks.first_outside.assign(blocks.center.size() + 1, 0);
+  for_each_border(edges, blocks.block_of_face,
+                  [&](uint32_t face, uint32_t) { ++blocks.first_outside[blocks.block_of_face[face] + 1]; });
+  std::partial_sum(blocks.first_outside.begin(), blocks.first_outside.end(), blocks.first_outside.begin());
+  blocks.outside.resize(blocks.first_outside.back());
+  std::vector<uint32_t> next = blocks.first_outside;
+  for_each_border(edges, blocks.block_of_face, [&](uint32_t face, uint32_t neighbour) {
+    blocks.outside[next[blocks.block_of_face[face]]++] = neighbour;
+  });
+  return blocks;
+}
+
+/// Evaluates the criterion of 7.1.2. Keeps its scratch memory between calls; one thread at a time.
+class BallExplorer {
+ public:
+  BallExplorer(const Surface& surface, const EdgeTable& edges, const Blocks& blocks, double radius)
+      : surface_(surface),
+        edges_(edges),
+        blocks_(blocks),
+        radius_(radius),
+        round_of_face_(surface.triangles.size(), 0),
+        round_of_block_(blocks.center.size(), 0) {}
+
+  bool is_on_macrosurface(uint32_t face) {
+    center_ = evaluation_point(surface_, face);
+    if (!touches_edges(face)) return true;  // the curve is a circle within the face
+    ++round_;
+    reached_ = 0;
+    curve_.clear();
+    front_.clear();
+    block_front_.clear();
+    reach(face);
+    while (reached_ <= kMaxExploredFaces) {
+      if (!front_.empty()) {
+        explore(pop(front_));
+      } else if (!block_front_.empty()) {
+        for (const uint32_t outside : blocks_.outside_of(pop(block_front_))) reach(outside);
+      } else {
+        return curve_.components() == 1;
+      }
+    }
+    return false;
+  }
+
+ private:
+  /// Where an edge meets the ball, seen from its smaller to its larger vertex.
+  struct EdgeCut {
+    bool touches = false;  ///< some of it lies inside
+    bool enters = false;   ///< the sphere is crossed from outside to inside: node 2 * edge
+    bool leaves = false;   ///< and from inside to outside: node 2 * edge + 1
+  };
+
+  static uint32_t pop(std::vector<uint32_t>& stack) {
+    const uint32_t last = stack.back();
+    stack.pop_back();
+    return last;
+  }
+
+  /// Notes a face that is connected to the first one: to be explored, or with all of its block, which the sphere does
+  /// not meet and of which each edge touches the ball.
+  void reach(uint32_t face) {
+    const uint32_t block = blocks_.block_of_face[face];
+    if (is_inside_ball(block)) {
+      if (std::exchange(round_of_block_[block], round_) == round_) return;
+      reached_ += blocks_.face_count[block];
+      block_front_.push_back(block);
+    } else {
+      if (std::exchange(round_of_face_[face], round_) == round_) return;
+      ++reached_;
+      front_.push_back(face);
+    }
+  }
+
+  bool is_inside_ball(uint32_t block) const {
+    constexpr double kRounding = 1e-9;  // against what vertices on the sphere are taken for
+    const double room = (1 - kRounding) * radius_ - blocks_.radius[block];
+    const dvec3 offset = blocks_.center[block] - center_;
+    return room > 0 && glm::dot(offset, offset) < room * room;
+  }
+
+  bool is_inside(uint32_t vertex) const {
+    const dvec3 offset = dvec3(surface_.positions[vertex]) - center_;
+    return glm::dot(offset, offset) <= radius_ * radius_;
+  }
+
+  EdgeCut cut(uint32_t edge) const {
+    return cut(edge, is_inside(edges_.smaller_vertex[edge]), is_inside(edges_.larger_vertex[edge]));
+  }
+
+  EdgeCut cut(uint32_t edge, bool a_inside, bool b_inside) const {
+    const uint32_t a = edges_.smaller_vertex[edge], b = edges_.larger_vertex[edge];
+    if (a_inside || b_inside) return {true, !a_inside, !b_inside};
+    const dvec3 origin = dvec3(surface_.positions[a]) - center_;
+    const dvec3 direction = dvec3(surface_.positions[b]) - dvec3(surface_.positions[a]);
+    const double length2 = glm::dot(direction, direction);
+    const double along = -glm::dot(origin, direction);
+    if (!(along > 0 && along < length2)) return {};
+    const dvec3 nearest = origin + direction * (along / length2);
+    const bool is_cut = glm::dot(nearest, nearest) < radius_ * radius_;
+    return {is_cut, is_cut, is_cut};
+  }
+
+  bool touches_edges(uint32_t face) const {
+    const uvec3& e = edges_.face_edges[face];
+    return cut(e.x).touches || cut(e.y).touches || cut(e.z).touches;
+  }
+
+  /// Adds the face's arcs to the curve, and its neighbours through edges that touch the ball to the exploration.
+  void explore(uint32_t face) {
+    // The part of a triangle inside a ball is convex. So along the triangle's boundary, where it leaves the ball an arc
+    // begins, and that arc ends where the boundary next enters again.
+    struct Crossing {
+      uint32_t node;
+      bool enters;
+    };
+    const uvec3& corners = surface_.triangles[face];
+    const std::array<bool, 3> inside = {is_inside(corners.x), is_inside(corners.y), is_inside(corners.z)};
+    std::array<Crossing, 6> crossings;
+    size_t count = 0;
+    for (int c = 0; c < 3; ++c) {
+      const uint32_t edge = edges_.face_edges[face][c];
+      const bool forward = corners[c] == edges_.smaller_vertex[edge];
+      const bool starts_inside = inside[static_cast<size_t>(c)];
+      const bool ends_inside = inside[static_cast<size_t>(next_corner(c))];
+      const EdgeCut edge_cut = forward ? cut(edge, starts_inside, ends_inside) : cut(edge, ends_inside, starts_inside);
+      if (!edge_cut.touches) continue;
+      for (const uint32_t neighbour : edges_.faces_of(edge)) {
+        if (neighbour != face) reach(neighbour);
+      }
+      const Crossing at_enter{2 * edge, forward}, at_leave{2 * edge + 1, !forward};
+      if (forward && edge_cut.enters) crossings[count++] = at_enter;
+      if (edge_cut.leaves) crossings[count++] = at_leave;
+      if (!forward && edge_cut.enters) crossings[count++] = at_enter;
+    }
+    for (size_t i = 0; i < count; ++i) {
+      if (!crossings[i].enters) curve_.link(crossings[i].node, crossings[(i + 1) % count].node);
+    }
+  }
+
+  const Surface& surface_;
+  const EdgeTable& edges_;
+  const Blocks& blocks_;
+  const double radius_;
+  dvec3 center_{0.0};
+  uint32_t round_ = 0;                    ///< counts calls
+  std::vector<uint32_t> round_of_face_;   ///< in which it was last reached
+  std::vector<uint32_t> round_of_block_;  ///< in which it was last reached as a whole
+  std::vector<uint32_t> front_;           ///< faces that are reached, not explored
+  std::vector<uint32_t> block_front_;
+  size_t reached_ = 0;  ///< faces
+  ComponentCounter curve_;
+};
 
 /// A set of faces that are connected through edges and have the same class.
 struct Piece {
@@ -320,21 +427,26 @@ void fill_small_islands(const Surface& surface, const EdgeTable& edges, double r
 
 }  // namespace
 
-std::vector<uint8_t> classify_macrosurface(const Surface& surface, float resolution) {
+std::vector<uint8_t> classify_macrosurface(const Surface& surface, float resolution, const Job& job) {
   if (!(resolution > 0)) return std::vector<uint8_t>(surface.triangles.size(), 1);
   const EdgeTable edges = build_edge_table(surface.triangles, surface.positions.size());
   const Patches patches = make_patches(surface, edges, kPatchRadius * resolution);
+  const Blocks blocks = make_blocks(surface, edges, kBlockRadius * resolution);
 
   std::vector<uint8_t> patch_is_macrosurface(patches.seeds.size());
-  parallel_for(patches.seeds.size(), 256, [&](size_t begin, size_t end) {
-    BallExplorer explorer(surface, edges, resolution);
-    for (size_t i = begin; i < end; ++i) patch_is_macrosurface[i] = explorer.is_on_macrosurface(patches.seeds[i]);
+  const size_t grain = std::max<size_t>(256, patches.seeds.size() / 64);  // an explorer has room for each face
+  parallel_for(patches.seeds.size(), grain, [&](size_t begin, size_t end) {
+    BallExplorer explorer(surface, edges, blocks, resolution);
+    for (size_t i = begin; i < end && !job.is_cancelled(); ++i) {
+      patch_is_macrosurface[i] = explorer.is_on_macrosurface(patches.seeds[i]);
+    }
   });
 
   std::vector<uint8_t> is_macrosurface(surface.triangles.size());
   for (size_t face = 0; face < is_macrosurface.size(); ++face) {
     is_macrosurface[face] = patch_is_macrosurface[patches.patch_of_face[face]];
   }
+  if (job.is_cancelled()) return is_macrosurface;
   drop_small_pieces(surface, edges, resolution, is_macrosurface);
   fill_small_islands(surface, edges, resolution, is_macrosurface);
   return is_macrosurface;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/job.h"
 #include "prefilter/surface.h"
 
 namespace farfield {
@@ -19,7 +20,7 @@ namespace farfield {
 /// Winding does not matter. At an edge with more than two faces all of them are connected; faces that share only a
 /// vertex are not. Where faces are much smaller than the resolution, one answer serves a patch of radius resolution /
 /// 8, so that the work per face stays bounded. A resolution that is not positive makes everything macrosurface.
-/// Deterministic for any thread count; thread-safe.
-std::vector<uint8_t> classify_macrosurface(const Surface& surface, float resolution);
+/// Deterministic for any thread count; thread-safe. Once the job is cancelled the answers mean nothing.
+std::vector<uint8_t> classify_macrosurface(const Surface& surface, float resolution, const Job& job = {});
 
 }  // namespace farfield

@@ -48,7 +48,8 @@ struct PartMesh {
 /// Cuts masked triangles along their masks' outlines; the others stay whole.
 class MaskCutter {
  public:
-  MaskCutter(const SourceSurface& source, const Job& job) : source_(source), job_(job) {}
+  MaskCutter(const SourceSurface& source, float resolution, const Job& job)
+      : source_(source), resolution_(resolution), job_(job) {}
 
   PartMesh run() {
     mesh_.positions = source_.positions;
@@ -70,6 +71,7 @@ class MaskCutter {
   struct Pattern {
     uint32_t material;
     MaskedTriangle triangle;
+    double texel_size = 0;  ///< the largest on a triangle that looks so; 0: not known
     CutPattern cut;
   };
 
@@ -103,11 +105,13 @@ class MaskCutter {
       });
       if (found != same_hash.end()) {
         pattern_of_[i] = *found;
+        note_texel_size(i);
         continue;
       }
       pattern_of_[i] = static_cast<uint32_t>(patterns_.size());
       same_hash.push_back(pattern_of_[i]);
-      patterns_.push_back({material, masked, {}});
+      patterns_.push_back({material, masked, 0, {}});
+      note_texel_size(i);
       of_material[material].push_back(masked);
     }
     std::vector<int> subdivisions;
@@ -117,10 +121,25 @@ class MaskCutter {
     parallel_for(patterns_.size(), 1, [&](size_t begin, size_t end) {
       for (size_t p = begin; p < end && !job_.is_cancelled(); ++p) {
         Pattern& pattern = patterns_[p];
-        pattern.cut =
-            cut_by_mask(source_.materials[pattern.material], pattern.triangle, subdivisions[pattern.material]);
+        pattern.cut = cut_by_mask(source_.materials[pattern.material], pattern.triangle, subdivisions[pattern.material],
+                                  tolerance_texels(pattern));
       }
     });
+  }
+
+  void note_texel_size(uint32_t i) {
+    const uvec3& t = source_.triangles[i];
+    Pattern& pattern = patterns_[pattern_of_[i]];
+    pattern.texel_size = std::max(pattern.texel_size,
+                                  texel_size(source_.materials[pattern.material], pattern.triangle,
+                                             {source_.positions[t.x], source_.positions[t.y], source_.positions[t.z]}));
+  }
+
+  /// No level shows where an outline is within a quarter of a voxel, nor is it known within a texel.
+  double tolerance_texels(const Pattern& pattern) const {
+    constexpr double kVoxels = 0.25, kLeastTexels = 1;
+    if (!(pattern.texel_size > 0)) return kOutlineTexels;
+    return std::max(kLeastTexels, kVoxels * resolution_ / pattern.texel_size);
   }
 
   void add_pieces(uint32_t triangle, const CutPattern& cut) {
@@ -161,6 +180,7 @@ class MaskCutter {
   }
 
   const SourceSurface& source_;
+  const float resolution_;
   const Job& job_;
   PartMesh mesh_;
   std::vector<uint32_t> pattern_of_;  ///< per triangle; kNoIndex: not masked
@@ -345,7 +365,7 @@ ResolvedSurface finish(const SourceSurface& source, const PartMesh& mesh, const 
 }  // namespace
 
 Result<ResolvedSurface> resolve(const SourceSurface& source, float resolution, const Job& job) {
-  PartMesh mesh = MaskCutter(source, job).run();
+  PartMesh mesh = MaskCutter(source, resolution, job).run();
   DetailSplitter(source, resolution, job, mesh).run();
   ResolvedSurface resolved = finish(source, mesh, job);
   if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");

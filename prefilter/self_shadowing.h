@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How much of the light that a voxel's geometry scatters gets away, compared with what its medium would let away
-// (after thesis 14.1.4, algorithm Iso; docs/decisions/0010), and how that depends on where it is seen from (0017).
+// (after thesis 14.1.4, algorithm Iso; docs/decisions/0010), and how that depends on where it is seen from (0017) and
+// from which side (0019).
 #pragma once
 
 #include <cstdint>
@@ -26,9 +27,9 @@ struct SelfShadowingOptions {
   Job job{};  ///< reports from the calling thread alone
 };
 
-/// Sets self_shadowing and the hot spot and raises albedos, for the densities that the volume has. Light goes on from
-/// what isotropic lines see first, in the geometry and in the medium, until it is out of both. The result does not
-/// depend on the number of threads. Errors: Cancelled.
+/// Sets self_shadowing, the hot spot and the open side and raises albedos, for the densities that the volume has. Light
+/// goes on from what isotropic lines see first, in the geometry and in the medium, until it is out of both. The result
+/// does not depend on the number of threads. Errors: Cancelled.
 Result<void> measure_self_shadowing(const LineScene& scene, SparseVolume& volume, const SelfShadowingOptions& options);
 
 }  // namespace farfield

@@ -199,7 +199,8 @@ class CollapsibleMesh {
 /// Collapses the edges of one mesh.
 class Simplifier {
  public:
-  Simplifier(CollapsibleMesh& mesh, double resolution) : mesh_(mesh), resolution_(resolution) {}
+  Simplifier(CollapsibleMesh& mesh, double resolution, const Job& job)
+      : mesh_(mesh), resolution_(resolution), job_(job) {}
 
   void run() {
     for (uint32_t v = 0; v < mesh_.positions.size(); ++v) {
@@ -208,7 +209,7 @@ class Simplifier {
         if (v < spoke.vertex) push(v, spoke.vertex);
       }
     }
-    while (!queue_.empty()) {
+    while (!queue_.empty() && !job_.is_cancelled()) {
       const Candidate candidate = queue_.top();
       queue_.pop();
       if (is_current(candidate) && try_collapse(candidate.a, candidate.b)) push_edges_at(candidate.a);
@@ -438,6 +439,7 @@ class Simplifier {
 
   CollapsibleMesh& mesh_;
   const double resolution_;
+  const Job& job_;
   std::priority_queue<Candidate> queue_;
 
   // About the edge at hand; members so that their memory is reused.
@@ -578,16 +580,16 @@ SimplifyResult compact(const WorkingSurface& working, const Parts& parts) {
 
 }  // namespace
 
-SimplifyResult simplify(const Surface& macrosurface, const SimplifyOptions& options) {
+SimplifyResult simplify(const Surface& macrosurface, const SimplifyOptions& options, const Job& job) {
   const Parts parts = find_parts(macrosurface);
   WorkingSurface working{macrosurface, std::vector<uint32_t>(macrosurface.positions.size()),
                          std::vector<uint8_t>(macrosurface.triangles.size(), 1)};
   std::iota(working.merged_into.begin(), working.merged_into.end(), 0u);
   if (options.resolution > 0) {
     parallel_for(parts.size(), 16, [&](size_t begin, size_t end) {
-      for (size_t part = begin; part < end; ++part) {
+      for (size_t part = begin; part < end && !job.is_cancelled(); ++part) {
         CollapsibleMesh mesh = extract_part(macrosurface, parts, part);
-        Simplifier(mesh, options.resolution).run();
+        Simplifier(mesh, options.resolution, job).run();
         store_part(mesh, parts, part, working);
       }
     });

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/job.h"
 #include "prefilter/surface.h"
 
 namespace farfield {
@@ -27,7 +28,8 @@ struct SimplifyResult {
 /// What stays: topology (link condition), so a manifold stays one; borders and non-manifold edges, which collapse only
 /// along themselves; the orientation of every face; the area enclosed by a plane border; and the distance to the
 /// input, up to a fraction of the resolution. A collapse that would break one of these is not made: simplification
-/// never fails, it stops earlier. Deterministic for any thread count; thread-safe.
-SimplifyResult simplify(const Surface& macrosurface, const SimplifyOptions& options);
+/// never fails, it stops earlier; so it does once the job is cancelled. Deterministic for any thread count;
+/// thread-safe.
+SimplifyResult simplify(const Surface& macrosurface, const SimplifyOptions& options, const Job& job = {});
 
 }  // namespace farfield

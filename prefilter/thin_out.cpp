@@ -12,12 +12,14 @@ namespace {
 
 /// Mean optical depth over the voxel's side, by which its mean transmittance is exp(-depth).
 double mean_depth(const Voxel& voxel, double size) {
-  return -std::log1p(-mean_opacity(voxel.sggx, voxel.density, size));
+  return -std::log1p(-mean_opacity(voxel.sggx, voxel.density * mean_share(voxel.octants), size));
 }
 
 /// Whether a voxel is so dense that its depth need not be computed: R_G is at least half of sqrt(lambda_max) = 1, and
 /// a depth of 0.02 is nearly linear in it.
-bool is_surely_kept(const Voxel& voxel, double size) { return voxel.density * size > 2.5 * kFaintestDepth; }
+bool is_surely_kept(const Voxel& voxel, double size) {
+  return voxel.density * mean_share(voxel.octants) * size > 2.5 * kFaintestDepth;
+}
 
 float densest(const SparseVolume& volume, uint64_t first, const VoxelMask& mask) {
   float density = 0;
@@ -60,6 +62,7 @@ SparseVolume thin_out(const SparseVolume& volume, uint64_t seed) {
   SparseVolume result;
   result.lattice = volume.lattice;
   result.hot_spot = volume.hot_spot;
+  result.open_side = volume.open_side;
   for (VoxelBrick brick : volume.bricks) {
     uint64_t next = brick.first_voxel;
     brick.first_voxel = result.voxels.size();

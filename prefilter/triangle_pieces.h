@@ -13,18 +13,48 @@ namespace farfield {
 
 using TrianglePiece = std::array<dvec3, 3>;
 
-/// Halves a triangle across its longest edge until no edge is longer than `longest` (> 0), and visits the pieces.
+/// Cuts a triangle into pieces none of whose edges is longer than `longest` (> 0), and visits them.
+///
+/// Needles are cut across, into pieces about as long as they are wide, others are halved across their longest edge.
+/// (One half of a needle is a needle as long as before: halving alone makes L^1.6 pieces of one that is L times too
+/// long.)
+template <typename Visit>
+void for_each_piece(const TrianglePiece& t, double longest, Visit&& visit);
+
+/// The pieces of a needle between `apex` and the edge from a to b, cut into this many slices.
+template <typename Visit>
+void for_each_piece_of_needle(const dvec3& apex, const dvec3& a, const dvec3& b, int slices, double longest,
+                              Visit&& visit) {
+  dvec3 a_before = apex, b_before = apex;
+  for (int i = 1; i <= slices; ++i) {
+    const double share = static_cast<double>(i) / slices;
+    const dvec3 a_here = i == slices ? a : apex + share * (a - apex),
+                b_here = i == slices ? b : apex + share * (b - apex);
+    for_each_piece({a_before, a_here, b_here}, longest, visit);
+    if (i > 1) for_each_piece({a_before, b_here, b_before}, longest, visit);
+    a_before = a_here, b_before = b_here;
+  }
+}
+
 template <typename Visit>
 void for_each_piece(const TrianglePiece& t, double longest, Visit&& visit) {
-  const auto length2 = [&](size_t c) {
+  constexpr double kNeedle = 3;    // length against width
+  constexpr double kSlice = 0.75;  // length of a slice: its diagonal, too, should be short enough
+  constexpr double kMostSlices = 1 << 20;
+  std::array<double, 3> length2;
+  for (size_t c = 0; c < 3; ++c) {
     const dvec3 edge = t[(c + 1) % 3] - t[c];
-    return glm::dot(edge, edge);
-  };
-  size_t cut = 0;
-  for (size_t c = 1; c < 3; ++c) {
-    if (length2(c) > length2(cut)) cut = c;
+    length2[c] = glm::dot(edge, edge);
   }
-  if (!(length2(cut) > longest * longest)) return visit(t);
+  const size_t cut = static_cast<size_t>(std::max_element(length2.begin(), length2.end()) - length2.begin());
+  if (!(length2[cut] > longest * longest)) return visit(t);
+
+  const size_t base = static_cast<size_t>(std::min_element(length2.begin(), length2.end()) - length2.begin());
+  const double length = std::sqrt(length2[cut]), width = std::max(longest, std::sqrt(length2[base]));
+  if (length > kNeedle * width) {
+    const int slices = static_cast<int>(std::min(std::ceil(length / (kSlice * width)), kMostSlices));
+    return for_each_piece_of_needle(t[(base + 2) % 3], t[base], t[(base + 1) % 3], slices, longest, visit);
+  }
   const dvec3 &from = t[cut], &to = t[(cut + 1) % 3], &apex = t[(cut + 2) % 3];
   const dvec3 middle = 0.5 * (from + to);
   for_each_piece({apex, from, middle}, longest, visit);

@@ -4,14 +4,8 @@
 // are long and only first hits count, as for cameras and lights: what is hidden, and the second side of a twig, count
 // nothing.
 //
-// Clumped geometry lets more through than a medium of its densities. So both are compared line by line. Let A be 1 for
-// a line that the geometry stops, T what the medium lets through of it, and d its depth in one voxel. The sum of
-// squares of A - (1 - T) is least where for each voxel
-//
-//    sum d T A  =  sum d T (1 - T),
-//
-// and the ratio of the two sides says by how much its density is wrong. Expected hits per voxel, which would make every
-// voxel right as seen from outside, blur silhouettes and empty the inside (measured in docs/decisions/0012).
+// Clumped geometry lets more through than a medium of its densities. So both are compared line by line (match_lines.h),
+// and what a voxel's geometry leaves empty becomes empty octants (octants.h).
 #include "prefilter/visible_density.h"
 
 #include <algorithm>
@@ -21,20 +15,20 @@
 #include "base/hash.h"
 #include "prefilter/density.h"
 #include "prefilter/fixed_sum.h"
+#include "prefilter/match_lines.h"
+#include "prefilter/octants.h"
 #include "prefilter/seen_sums.h"
-#include "prefilter/voxel_ratios.h"
 
 namespace farfield {
 namespace {
 
-constexpr double kPriorHits = 2;   ///< hits that a voxel's own measurement counts as, against what lines see of it
-constexpr double kPriorMatch = 1;  ///< the same for matching, in units of sum d T A
-constexpr int kMatchPasses = 8;
-constexpr double kMostMatch = 1.5;  ///< a pass changes a density by no larger factor
+constexpr double kPriorHits = 2;  ///< hits that a voxel's own measurement counts as, against what lines see of it
+constexpr int kMatchPasses = 4;
 constexpr double kMostWhole = 2;
 
-/// All lines, as a multiple of options.lines, for the progress.
-constexpr double kAllLines = 2.75;
+/// Lines of each step, as a multiple of options.lines.
+constexpr double kHazardLines = 1, kOctantLines = 2, kMatchLines = 0.5, kFirstWholeLines = 0.25, kWholeLines = 0.5;
+constexpr double kAllLines = kHazardLines + kOctantLines + kMatchLines + kFirstWholeLines + kWholeLines;
 
 class DensityMatcher {
  public:
@@ -42,11 +36,12 @@ class DensityMatcher {
       : scene_(scene), volume_(volume), options_(options) {}
 
   Result<void> run() {
-    FARFIELD_TRY(measure_hazard(pass(0, 1)));
-    for (uint64_t i = 0; i < kMatchPasses; ++i) FARFIELD_TRY(match_voxels(pass(1 + i, 1.0 / kMatchPasses)));
+    FARFIELD_TRY(measure_hazard(next_pass(kHazardLines)));
+    FARFIELD_TRY(measure_octants(scene_, volume_, next_pass(kOctantLines)));
+    for (int i = 0; i < kMatchPasses; ++i) FARFIELD_TRY(match_voxels(next_pass(kMatchLines / kMatchPasses)));
     // Only the last of these must be exact.
-    FARFIELD_TRY(match_whole(pass(kMatchPasses + 1, 0.25)));
-    FARFIELD_TRY(match_whole(pass(kMatchPasses + 2, 0.5)));
+    FARFIELD_TRY(match_whole(next_pass(kFirstWholeLines)));
+    FARFIELD_TRY(match_whole(next_pass(kWholeLines)));
     return {};
   }
 
@@ -73,27 +68,12 @@ class DensityMatcher {
     return {};
   }
 
-  /// One step towards the least squares of the file's first comment.
+  /// One step towards the least squares of match_lines.h.
   Result<void> match_voxels(const LinePass& pass) {
-    struct Part {
-      uint32_t voxel;
-      double depth;
-    };
-    std::vector<SourceAndMedium> sums(volume_.voxels.size());
-    FARFIELD_TRY(for_lines(scene_, pass, [&](const SeenLine& line, SplitMix&) {
-      thread_local std::vector<Part> parts;
-      parts.clear();
-      double depth = 0;
-      visit_depths(volume_, scene_.grid(), line.ray, [&](uint32_t v, double of_voxel) {
-        parts.push_back({v, of_voxel});
-        depth += of_voxel;
-      });
-      const double passing = std::exp(-depth), stopped = -std::expm1(-depth);
-      for (const Part& part : parts) {
-        if (line.hit) sums[part.voxel].source.add(part.depth * passing);
-        sums[part.voxel].medium.add(part.depth * passing * stopped);
-      }
-    }));
+    FARFIELD_TRY_LET(const auto sums,
+                     match_lines(scene_, volume_.voxels.size(), pass, [&](const VoxelRay& ray, const auto& visit) {
+                       visit_depths(volume_, scene_.grid(), ray, visit);
+                     }));
     const std::vector<double> ratios = shrunk_ratios(volume_, sums, kPriorMatch);
     for (size_t v = 0; v < ratios.size(); ++v) {
       scale(std::clamp(ratios[v], 1 / kMostMatch, kMostMatch), volume_.voxels[v]);
@@ -122,16 +102,17 @@ class DensityMatcher {
   }
 
   /// The next lines, this share of options.lines; all different from those of other passes.
-  LinePass pass(uint64_t number, double share) {
+  LinePass next_pass(double share) {
     const double begin = done_;
     done_ += share / kAllLines;
-    return {share * options_.lines, mix64(options_.seed, number), options_.job.step("see", begin, done_)};
+    return {share * options_.lines, mix64(options_.seed, passes_++), options_.job.step("see", begin, done_)};
   }
 
   const LineScene& scene_;
   SparseVolume& volume_;
   const VisibleDensityOptions& options_;
-  double done_ = 0;  ///< of all lines
+  double done_ = 0;      ///< of all lines
+  uint64_t passes_ = 0;  ///< that were begun
 };
 
 }  // namespace

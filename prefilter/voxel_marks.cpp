@@ -4,38 +4,74 @@
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
+#include <utility>
 
 #include "base/check.h"
-#include "base/parallel.h"
+#include "base/parallel_job.h"
 #include "prefilter/triangle_pieces.h"
 
 namespace farfield {
 namespace {
 
-/// A voxel of a brick: the brick's key and the bit.
-struct MarkedVoxel {
-  uint64_t brick;
-  uint32_t bit;
-  auto operator<=>(const MarkedVoxel&) const = default;
-};
-
-void sort_unique(std::vector<MarkedVoxel>& marks) {
-  std::sort(marks.begin(), marks.end());
-  marks.erase(std::unique(marks.begin(), marks.end()), marks.end());
-}
-
-/// Marks the voxels in the box of a piece of a triangle that is about as small as a voxel; in voxel units.
-void mark_piece(const TrianglePiece& t, std::vector<MarkedVoxel>& marks) {
-  const auto& [a, b, c] = t;
-  const ivec3 lower(glm::floor(glm::min(a, glm::min(b, c)))), upper(glm::floor(glm::max(a, glm::max(b, c))));
-  for (int z = lower.z; z <= upper.z; ++z) {
-    for (int y = lower.y; y <= upper.y; ++y) {
-      for (int x = lower.x; x <= upper.x; ++x) {
-        marks.push_back(
-            {cell_key({x >> 3, y >> 3, z >> 3}), static_cast<uint32_t>((x & 7) + 8 * (y & 7) + 64 * (z & 7))});
+/// Voxels by brick, while they are being marked. One thread at a time.
+class BrickMarks {
+ public:
+  /// Marks all voxels of a box, upper corner included. Most are within one brick, and in that of the box before.
+  void mark(const ivec3& lower, const ivec3& upper) {
+    const ivec3 first = lower >> 3, last = upper >> 3;
+    for (int z = first.z; z <= last.z; ++z) {
+      for (int y = first.y; y <= last.y; ++y) {
+        for (int x = first.x; x <= last.x; ++x) {
+          const ivec3 brick(x, y, z), corner = brick * kBrickSide;
+          mark_in_brick(mask_of(brick), glm::max(lower - corner, 0), glm::min(upper - corner, kBrickSide - 1));
+        }
       }
     }
   }
+
+  const std::unordered_map<uint64_t, VoxelMask>& masks() const { return masks_; }
+
+ private:
+  VoxelMask& mask_of(const ivec3& brick) {
+    const uint64_t key = cell_key(brick);
+    if (!mask_ || key != key_) key_ = key, mask_ = &masks_[key];
+    return *mask_;
+  }
+
+  static void mark_in_brick(VoxelMask& mask, const ivec3& lower, const ivec3& upper) {
+    const uint64_t row = (uint64_t{2} << upper.x) - (uint64_t{1} << lower.x);
+    uint64_t slice = 0;
+    for (int y = lower.y; y <= upper.y; ++y) slice |= row << (8 * y);
+    for (int z = lower.z; z <= upper.z; ++z) mask[static_cast<size_t>(z)] |= slice;
+  }
+
+  std::unordered_map<uint64_t, VoxelMask> masks_;  ///< whose elements stay where they are
+  uint64_t key_ = 0;
+  VoxelMask* mask_ = nullptr;  ///< of key_
+};
+
+/// Marks the voxels in the box of a piece of a triangle that is about as small as a voxel; in voxel units.
+void mark_piece(const TrianglePiece& t, BrickMarks& marks) {
+  const auto& [a, b, c] = t;
+  marks.mark(ivec3(glm::floor(glm::min(a, glm::min(b, c)))), ivec3(glm::floor(glm::max(a, glm::max(b, c)))));
+}
+
+/// What was marked, in the order of a VoxelSet.
+VoxelSet united(const std::vector<BrickMarks>& chunks) {
+  std::vector<std::pair<uint64_t, const VoxelMask*>> parts;
+  for (const BrickMarks& marks : chunks) {
+    for (const auto& [key, mask] : marks.masks()) parts.emplace_back(key, &mask);
+  }
+  std::sort(parts.begin(), parts.end());
+  VoxelSet set;
+  for (size_t i = 0; i < parts.size(); ++i) {
+    if (i == 0 || parts[i].first != parts[i - 1].first) {
+      set.coordinates.push_back(cell_of_key(parts[i].first));
+      set.masks.push_back({});
+    }
+    for (size_t z = 0; z < set.masks.back().size(); ++z) set.masks.back()[z] |= (*parts[i].second)[z];
+  }
+  return set;
 }
 
 /// Half-width along x of the voxels whose centres are within reach of a voxel at offset (dy, dz), or -1.
@@ -90,39 +126,17 @@ uint64_t VoxelSet::size() const {
   return count;
 }
 
-VoxelSet mark_voxels(const Surface& geometry, const VoxelLattice& lattice) {
+VoxelSet mark_voxels(const Surface& geometry, const VoxelLattice& lattice, const Job& job) {
   constexpr size_t kGrain = 4096;
-  const size_t chunks = (geometry.triangles.size() + kGrain - 1) / kGrain;
-  std::vector<std::vector<MarkedVoxel>> per_chunk(chunks);
-  parallel_for(geometry.triangles.size(), kGrain, [&](size_t begin, size_t end) {
-    std::vector<MarkedVoxel>& marks = per_chunk[begin / kGrain];
-    size_t limit = 1 << 20;
+  std::vector<BrickMarks> chunks((geometry.triangles.size() + kGrain - 1) / kGrain);
+  const bool is_done = parallel_for(job.quiet(), "", geometry.triangles.size(), kGrain, [&](size_t begin, size_t end) {
+    BrickMarks& marks = chunks[begin / kGrain];
     for (size_t i = begin; i < end; ++i) {
       for_each_piece(in_cells(corners_of(geometry, i), lattice.origin, lattice.voxel_size), 1,
                      [&](const TrianglePiece& piece) { mark_piece(piece, marks); });
-      if (marks.size() > limit) {
-        sort_unique(marks);
-        limit = std::max<size_t>(limit, 2 * marks.size());
-      }
     }
-    sort_unique(marks);
   });
-
-  std::vector<MarkedVoxel> all;
-  for (std::vector<MarkedVoxel>& marks : per_chunk) {
-    all.insert(all.end(), marks.begin(), marks.end());
-    marks = {};
-  }
-  sort_unique(all);
-  VoxelSet set;
-  for (size_t i = 0; i < all.size(); ++i) {
-    if (i == 0 || all[i].brick != all[i - 1].brick) {
-      set.coordinates.push_back(cell_of_key(all[i].brick));
-      set.masks.push_back({});
-    }
-    set.masks.back()[all[i].bit >> 6] |= uint64_t{1} << (all[i].bit & 63);
-  }
-  return set;
+  return is_done ? united(chunks) : VoxelSet{};
 }
 
 VoxelSet widen(const VoxelSet& set, double reach) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/hash.h"
+#include "base/job.h"
 #include "base/vec.h"
 #include "cache/level.h"
 #include "prefilter/grid_cells.h"
@@ -51,8 +52,8 @@ struct VoxelSet {
 };
 
 /// All voxels that triangles pass through, and some that they pass by within a voxel. All geometry must lie within
-/// kCellLimit - 64 voxels of the origin. Deterministic for any thread count.
-VoxelSet mark_voxels(const Surface& geometry, const VoxelLattice& lattice);
+/// kCellLimit - 64 voxels of the origin. Deterministic for any thread count. None once the job is cancelled.
+VoxelSet mark_voxels(const Surface& geometry, const VoxelLattice& lattice, const Job& job = {});
 
 /// The largest reach of widen().
 inline constexpr int kMaxReach = 3;

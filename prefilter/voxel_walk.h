@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "base/vec.h"
@@ -65,6 +66,16 @@ class VoxelGrid {
   /// Around the stored voxels; empty volume: of size 0.
   const VoxelBox& box() const { return box_; }
 
+  /// The number of a stored voxel in the volume.
+  std::optional<uint32_t> find(const ivec3& voxel) const {
+    const ivec3 at = voxel >> 3;
+    for (int a = 0; a < 3; ++a) {
+      if (at[a] < lower_[a] || at[a] >= upper_[a]) return {};
+    }
+    const uint32_t brick = table_[cell_of(at)];
+    return brick == kNoBrick ? std::nullopt : bricks_[brick].find(voxel - at * kBrickSide);
+  }
+
   /// Calls visit(number of the voxel in the volume, t_enter, t_leave) along the ray, in order, while it returns true.
   /// Never for rays that are not finite.
   template <typename Visit>
@@ -81,6 +92,14 @@ class VoxelGrid {
   struct Brick {
     VoxelMask mask;
     std::array<uint32_t, 8> first_of_word;  ///< number of the first voxel of each word
+
+    /// `c`: from the brick's corner, in [0, kBrickSide).
+    std::optional<uint32_t> find(const ivec3& c) const {
+      const auto word = static_cast<size_t>(c.z);
+      const uint64_t bit = uint64_t{1} << (c.x + kBrickSide * c.y);
+      if (!(mask[word] & bit)) return {};
+      return first_of_word[word] + static_cast<uint32_t>(__builtin_popcountll(mask[word] & (bit - 1)));
+    }
   };
 
   size_t cell_of(const ivec3& brick) const {
@@ -94,12 +113,8 @@ class VoxelGrid {
     const ivec3 corner = at * kBrickSide;
     const Brick& brick = bricks_[number];
     return walk_cells(ray, 1, corner, corner + kBrickSide, [&](const ivec3& cell, double enter, double leave) {
-      const ivec3 c = cell - corner;
-      const auto word = static_cast<size_t>(c.z);
-      const uint64_t bit = uint64_t{1} << (c.x + kBrickSide * c.y);
-      if (!(brick.mask[word] & bit)) return true;
-      const int before = __builtin_popcountll(brick.mask[word] & (bit - 1));
-      return static_cast<bool>(visit(brick.first_of_word[word] + static_cast<uint32_t>(before), enter, leave));
+      const auto number_of_voxel = brick.find(cell - corner);
+      return !number_of_voxel || static_cast<bool>(visit(*number_of_voxel, enter, leave));
     });
   }
 

@@ -186,8 +186,8 @@ uint32_t rays_per_voxel(uint64_t voxels, const VoxelizeOptions& options) {
 }
 
 /// The voxels that may be hit.
-VoxelSet find_candidates(const Surface& geometry, const VoxelLattice& lattice) {
-  return widen(mark_voxels(geometry, lattice), kReach);
+VoxelSet find_candidates(const Surface& geometry, const VoxelLattice& lattice, const Job& job = {}) {
+  return widen(mark_voxels(geometry, lattice, job), kReach);
 }
 
 /// The kept voxels of every stride-th candidate brick of the range; the masks of these bricks become theirs.
@@ -224,7 +224,7 @@ Result<SparseVolume> voxelize(const OpacityScene& geometry, const VoxelLattice& 
   FARFIELD_TRY(check_arguments(geometry.surface(), lattice, options));
   SparseVolume volume;
   volume.lattice = lattice;
-  VoxelSet candidates = find_candidates(geometry.surface(), lattice);
+  VoxelSet candidates = find_candidates(geometry.surface(), lattice, options.job);
   FARFIELD_TRY_LET(auto voxels, measure_bricks(geometry, lattice, candidates, 1, options));
   for (size_t i = 0; i < voxels.size(); ++i) {
     std::vector<Voxel>& of_brick = voxels[i];
@@ -245,7 +245,8 @@ Result<VolumeSize> estimate_volume(const Surface& geometry, const VoxelLattice& 
   constexpr size_t kStride = 32, kEnoughBricks = 64;
   FARFIELD_TRY(check_arguments(geometry, lattice, options));
   VolumeSize size;
-  VoxelSet candidates = find_candidates(geometry, lattice);
+  VoxelSet candidates = find_candidates(geometry, lattice, options.job);
+  if (options.job.is_cancelled()) return make_error(ErrorCode::Cancelled, "voxelize: cancelled");
   if (candidates.coordinates.size() < kStride * kEnoughBricks) return size;
   VoxelizeOptions quietly = options;
   quietly.job = options.job.quiet();

@@ -19,7 +19,8 @@ namespace farfield {
 /// A voxel's microflakes, in full precision.
 struct Voxel {
   float density = 0;  ///< rho_g > 0, in 1 / scene unit: the attenuation along the axis of the largest eigenvalue
-  SymMat3 sggx;       ///< scaled to lambda_max = 1
+  PackedOctants octants = kFullOctants;  ///< where in the voxel that is so. Not measured by voxelize()
+  SymMat3 sggx;                          ///< scaled to lambda_max = 1
   vec3 diffuse{0.0f};
   vec3 specular{0.0f};
   vec3 transmission{0.0f};
@@ -40,7 +41,8 @@ struct SparseVolume {
   VoxelLattice lattice;
   std::vector<VoxelBrick> bricks;  ///< none empty; sorted by z, then y, then x
   std::vector<Voxel> voxels;
-  float hot_spot = 0;  ///< of all voxels (scattering/hot_spot.h). Not measured by voxelize()
+  float hot_spot = 0;    ///< of all voxels (scattering/hot_spot.h). Not measured by voxelize()
+  vec3 open_side{0.0f};  ///< of all voxels (scattering/open_side.h). Not measured by voxelize()
 };
 
 /// Some of the bricks that may hold voxels, by their number in the order of SparseVolume::bricks. Ranges that follow

@@ -144,7 +144,7 @@ FloatArray render_scene(const py::list& scene, const py::dict& fields, const std
   trace.transparent = fields["transparent"].cast<bool>();
   RuntimeOptions options;
   options.budget_bytes = fields["budget_bytes"].cast<uint64_t>();
-  options.lod_scale = fields["lod_scale"].cast<float>();
+  options.pixel_error = fields["pixel_error"].cast<float>();
   if (!fields["level"].is_none()) options.forced_lambda = fields["level"].cast<float>();
   options.messages = [&](Severity severity, const std::string& text) {
     if (severity != Severity::Info) call.call_python([&] { warn(text); });

@@ -38,15 +38,17 @@ float FramePlanner::wanted_lambda(const InstanceRecord& instance) const {
 
 std::vector<PlanAsset> FramePlanner::wanted_assets(const LevelStore& levels) const {
   std::vector<PlanAsset> wanted;
-  for (uint32_t i = 0; i < levels.asset_count(); ++i) wanted.push_back(levels.plan_asset(i));
+  for (uint32_t i = 0; i < levels.asset_count(); ++i) {
+    wanted.push_back(levels.plan_asset(i));
+    if (options_.forced_lambda) wanted.back().ray_cost.clear();  // that very level, whatever it costs
+  }
   for (const InstanceRecord& instance : geometry_.instances) {
     PlanAsset& asset = wanted[instance.asset];
-    asset.wanted_lambda = std::min(asset.wanted_lambda, wanted_lambda(instance));
     // The longest side of the world, in pixels, squared.
     const double diagonal = glm::length(geometry_.assets[instance.asset]->bounds.size());
     const double pixel = instance.footprint.camera_footprint * instance.footprint.world_to_r0;
-    const double across = pixel > 0.0 ? options_.lod_scale * diagonal / pixel : kLargestPixelCount;
-    asset.pixels += std::min(across * across, kLargestPixelCount);
+    const double across = pixel > 0.0 ? options_.pixel_error * diagonal / pixel : kLargestPixelCount;
+    asset.ask(wanted_lambda(instance), std::min(across * across, kLargestPixelCount));
   }
   return wanted;
 }
@@ -80,10 +82,12 @@ Result<PlanSummary> FramePlanner::plan(LevelStore& levels) {
 
   PlanSummary summary;
   for (uint32_t i = 0; i < levels.asset_count(); ++i) {
-    summary.finest_level.push_back(levels.asset(i).levels[plan->finest[i]].level);
+    summary.finest_level.push_back(levels.asset(i).levels[plan->finest(i)].level);
   }
   summary.planned_bytes = plan->resident_bytes + plan->build_peak_bytes + levels.fixed_bytes() + plan->texture_bytes;
   summary.bias = plan->bias;
+  summary.levels_given_up = plan->levels_given_up;
+  summary.asked_bytes = plan->asked_bytes;
   return summary;
 }
 
@@ -93,7 +97,7 @@ void FramePlanner::prefetch(LevelStore& levels) const {
   for (const InstanceRecord& instance : geometry_.instances) {
     const SlotBlend slots = split_slots(*geometry_.assets[instance.asset], wanted_lambda(instance));
     is_needed[instance.asset][slots.slot] = true;
-    if (slots.blend > 0.0f) is_needed[instance.asset][slots.slot + 1] = true;
+    if (slots.blend > 0.0f) is_needed[instance.asset][slots.coarser] = true;
   }
   for (uint32_t i = 0; i < levels.asset_count(); ++i) {
     for (size_t slot = is_needed[i].size(); slot-- > 0;) {  // coarse ones first: they are what others fall back to

@@ -104,6 +104,11 @@ vec3 visible_normal(vec3 normal, const vec3& geometric_normal, const vec3& wo) {
   return cosine >= kLeastCosine ? normal : glm::normalize(normal + (kLeastCosine - cosine) * wo);
 }
 
+/// Turned with the flakes, and as long as it was.
+vec3 open_side_to_world(const vec3& open_side, const InstanceRecord& instance) {
+  return glm::length(open_side) * glm::normalize(glm::transpose(ScaledInverse(instance).matrix) * open_side);
+}
+
 FlakeParams flake_params(const LevelView& level, const InstanceRecord& instance, uint32_t voxel) {
   FlakeParams params;
   params.sggx = to_world(level.voxel_sggx.empty() ? SymMat3::identity() : unpack(level.voxel_sggx[voxel]), instance);
@@ -113,6 +118,7 @@ FlakeParams flake_params(const LevelView& level, const InstanceRecord& instance,
   params.roughness2 = unorm_at(level.voxel_roughness2, voxel);
   params.self_shadowing = unorm_at(level.voxel_self_shadowing, voxel);
   params.hot_spot = level.header.hot_spot;
+  if (level.header.open_side != vec3(0.0f)) params.open_side = open_side_to_world(level.header.open_side, instance);
   return params;
 }
 

@@ -58,7 +58,7 @@ Result<uint32_t> LevelStore::open(const std::filesystem::path& folder, MaterialF
     refused_.push_back(std::move(asset));
     return tl::unexpected(root.error());
   }
-  asset->traced.finest_slot = asset->traced.slot_count() - 1;  // until a plan says otherwise
+  asset->traced.usable_slots = {static_cast<uint8_t>(asset->traced.slot_count() - 1)};  // until a plan says otherwise
   assets_.push_back(std::move(asset));
   levels_.set_other_bytes(fixed_bytes() + texture_bytes_);
   return static_cast<uint32_t>(assets_.size() - 1);
@@ -96,9 +96,8 @@ Result<Plan> LevelStore::plan_roots(const OpenAsset& newcomer) const {
   std::vector<PlanAsset> wanted;
   for (const auto& asset : assets_) wanted.push_back(plan_asset(*asset));
   wanted.push_back(plan_asset(newcomer));
-  for (PlanAsset& asset : wanted) asset.wanted_lambda = asset.lambda.back();
   auto plan = plan_levels(wanted, budget_bytes_, fixed_bytes() + newcomer.table_bytes());
-  if (plan) plan->finest.pop_back();  // apply() knows the newcomer not yet
+  if (plan) plan->usable.pop_back();  // apply() knows the newcomer not yet
   return plan;
 }
 
@@ -110,15 +109,14 @@ PlanAsset LevelStore::plan_asset(const OpenAsset& asset) const {
     wanted.build_peak_bytes.push_back(is_lost ? 0 : levels_.build_peak_bytes(item));
   }
   wanted.lambda = asset.traced.level_numbers;
-  wanted.wanted_lambda = wanted.lambda.back();  // if it has no instances
-  wanted.pixels = 0.0;
+  wanted.ray_cost = asset.ray_cost;
   return wanted;
 }
 
 uint64_t LevelStore::wanted_texture_bytes(const Plan& plan) const {
-  for (size_t i = 0; i < plan.finest.size(); ++i) {
+  for (size_t i = 0; i < plan.usable.size(); ++i) {
     const OpenAsset& asset = *assets_[i];
-    const bool shows_source = asset.levels[plan.finest[i]].level == 0;
+    const bool shows_source = asset.levels[plan.finest(i)].level == 0;
     if (shows_source && asset.close_up->has_textures()) return textures_.wanted_bytes(budget_bytes_);
   }
   return 0;
@@ -133,12 +131,12 @@ void LevelStore::report_no_room_for_textures(const Error& error) {
 void LevelStore::apply(const Plan& plan, uint64_t texture_bytes) {
   loader_.forget();
   std::vector<size_t> dropped;
-  for (size_t i = 0; i < plan.finest.size(); ++i) {
+  for (size_t i = 0; i < plan.usable.size(); ++i) {
     OpenAsset& asset = *assets_[i];
-    asset.traced.finest_slot = plan.finest[i];
+    asset.traced.usable_slots = plan.usable[i];
     for (uint32_t slot = 0; slot < asset.traced.slot_count(); ++slot) {
       const bool is_refused = levels_.state(asset.items[slot]) == ItemState::Refused;  // this plan may have room for it
-      if (slot < plan.finest[i] || is_refused) {
+      if (!asset.traced.is_usable(slot) || is_refused) {
         asset.traced.loaded[slot].store(nullptr, std::memory_order_relaxed);  // no ray in flight
         dropped.push_back(asset.items[slot]);
       }

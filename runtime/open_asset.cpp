@@ -83,7 +83,7 @@ Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::
 }  // namespace
 
 uint64_t OpenAsset::table_bytes() const {
-  constexpr uint64_t kPerLevel = sizeof(LevelInfo) + 3 * sizeof(uint64_t) + sizeof(float) + sizeof(void*) +
+  constexpr uint64_t kPerLevel = sizeof(LevelInfo) + 3 * sizeof(uint64_t) + 2 * sizeof(float) + sizeof(void*) +
                                  512;  // the ResidentSet's item and its function
   return sizeof(OpenAsset) + close_up->table_bytes() + traced.hull.capacity() * sizeof(vec3) +
          levels.size() * kPerLevel;
@@ -114,6 +114,7 @@ Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folde
     asset->levels.push_back({entry.level, static_cast<float>(entry.resolution), entry.triangles, entry.voxels,
                              entry.file_bytes, entry.resident_bytes});
     asset->build_peak_bytes.push_back(entry.build_peak_bytes);
+    asset->ray_cost.push_back(static_cast<float>(entry.ray_cost));
     asset->file_names.push_back(entry.file);
     asset->file_hashes.push_back(entry.file_hash);
   }

@@ -32,6 +32,7 @@ struct OpenAsset {
   std::unique_ptr<CloseUp> close_up;  ///< of level 0
   std::vector<LevelInfo> levels;
   std::vector<uint64_t> build_peak_bytes;  ///< per level, from the manifest
+  std::vector<float> ray_cost;             ///< per level, from the manifest; 0: not recorded
   std::vector<std::string> file_names;     ///< per level, inside the folder
   std::vector<uint64_t> file_hashes;       ///< per level, of the whole file
   std::vector<size_t> items;               ///< per level: its number in the ResidentSet

@@ -23,7 +23,8 @@ constexpr uint64_t kHostBytesPerInstance = 136;
 Result<void> check_options(const RuntimeOptions& options) {
   const auto invalid = [](const char* what) { return make_error(ErrorCode::InvalidArgument, what); };
   if (options.budget_bytes == 0) return invalid("the budget is 0 bytes; give RuntimeOptions::budget_bytes a size");
-  if (!(options.lod_scale > 0.0f) || !std::isfinite(options.lod_scale)) return invalid("lod_scale must be positive");
+  if (!(options.pixel_error > 0.0f) || !std::isfinite(options.pixel_error))
+    return invalid("pixel_error must be positive");
   if (options.forced_lambda && !std::isfinite(*options.forced_lambda)) return invalid("forced_lambda must be finite");
   return {};
 }
@@ -126,7 +127,7 @@ Result<InstanceId> Runtime::add_instance(AssetId asset, const glm::mat4x3& local
   if (instances.size() >= kNoInstance) return make_error(ErrorCode::InvalidArgument, "too many instances");
   const dvec3& origin = impl_->levels.asset(asset.value).origin;
   FARFIELD_TRY_LET(auto record, make_instance(asset.value, with_origin(local_to_world, origin)));
-  record.footprint.world_to_r0 = impl_->options.lod_scale / largest_stretch(local_to_world);
+  record.footprint.world_to_r0 = impl_->options.pixel_error / largest_stretch(local_to_world);
   instances.push_back(record);
   if (data != InstanceData()) {
     impl_->instance_data.resize(instances.size());

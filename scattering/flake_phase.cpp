@@ -7,6 +7,6 @@ namespace farfield {
 template class FlakeModel<kFlakeChannels>;
 
 static_assert(sizeof(FlakePhase) <= 160);
-static_assert(sizeof(FlakeModel<kDiffuse>) <= 68);
+static_assert(sizeof(FlakeModel<kDiffuse>) <= 80);
 
 }  // namespace farfield

@@ -12,8 +12,9 @@
 // light that meets another flake close by is coloured again. The thesis stores albedo_ms per voxel instead (14.1.16);
 // this needs no bytes and keeps white white.
 //
-// Reciprocal in the sense of anisotropic media, sigma(wo) f(wo, wi) = sigma(wi) f(wi, wo), but for the hot spot's
-// factor (scattering/hot_spot.h); the integral over wi is at most 1, and 1 where diffuse + transmission = 1.
+// Reciprocal in the sense of anisotropic media, sigma(wo) f(wo, wi) = sigma(wi) f(wi, wo), but for the hot spot and for
+// open sides (scattering/hot_spot.h, open_side.h), and of light that goes through these; the integral over wi is at
+// most 1, and 1 where diffuse + transmission = 1.
 #pragma once
 
 #include "base/random.h"
@@ -36,6 +37,7 @@ struct FlakeParams {
   float roughness2 = 1.0f;
   float self_shadowing = 1.0f;  ///< A in (0, 1]; 1: none
   float hot_spot = 0.0f;        ///< strength in [0, kStrongestHotSpot] (scattering/hot_spot.h); 0: none
+  vec3 open_side{0.0f};         ///< at most kMostOpenSide long (scattering/open_side.h); 0: both sides are alike
 };
 
 /// A voxel's scattering seen from wo, given that a collision happened, with the given channels (scattering/channels.h);
@@ -88,10 +90,12 @@ class FlakeModel {
   float multiple_density(const vec3& wi) const requires(kHasMultiple);
   bool scatters_once() const { return chances_.specular + chances_.diffuse + chances_.transmission > 0; }
   Flake sample_flake(Rng& rng) const;
+  void open(const vec3& normal, SurfaceParams& params) const requires(kHasBase);
 
   CholeskyFactor<float> flakes_;
   vec3 wo_;
   float hot_spot_ = 0;
+  vec3 open_side_;
   Chances chances_;
   [[no_unique_address]] PartIf<kHasDiffuse, vec3> diffuse_{};
   [[no_unique_address]] PartIf<kHasTransmission, vec3> transmission_{};

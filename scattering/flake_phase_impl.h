@@ -8,6 +8,7 @@
 #include "scattering/albedo.h"
 #include "scattering/carlson.h"
 #include "scattering/highlight.h"
+#include "scattering/open_side.h"
 
 #include <limits>
 
@@ -49,7 +50,8 @@ inline float diffuse_density(const CholeskyFactor<float>& b, const vec3& wo, con
 }  // namespace detail
 
 template <unsigned kChannels>
-FlakeModel<kChannels>::FlakeModel(const FlakeParams& params, const vec3& wo) : wo_(wo), hot_spot_(params.hot_spot) {
+FlakeModel<kChannels>::FlakeModel(const FlakeParams& params, const vec3& wo)
+    : wo_(wo), hot_spot_(params.hot_spot), open_side_(params.open_side) {
   const SymMat3 s = detail::usable_sggx(params.sggx);
   flakes_ = cholesky(s);
   if constexpr (kHasDiffuse) diffuse_ = clamp_albedo(params.diffuse), chances_.diffuse = max_component(diffuse_);
@@ -113,8 +115,17 @@ typename FlakeModel<kChannels>::Flake FlakeModel<kChannels>::sample_flake(Rng& r
   if constexpr (kHasDiffuse) params.diffuse = diffuse_;
   if constexpr (kHasTransmission) params.transmission = transmission_;
   if constexpr (kHasSpecular) params.specular = specular_.f0, params.roughness2 = specular_.roughness2;
+  if constexpr (kHasBase) {
+    if (open_side_ != vec3(0.0f)) open(m, params);
+  }
   params.hot_spot = hot_spot_;
   return Flake(params, m, wo_);
+}
+
+template <unsigned kChannels>
+void FlakeModel<kChannels>::open(const vec3& normal, SurfaceParams& params) const requires(kHasBase) {
+  const vec3 gain = open_side_gain(open_side_, normal, params.diffuse + params.transmission);
+  params.diffuse *= gain, params.transmission *= gain;
 }
 
 template <unsigned kChannels>

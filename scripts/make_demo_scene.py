@@ -167,9 +167,8 @@ def ground(half_size=320.0, cells=80):
     return part
 
 
-def camera_path(target, frames):
-    """From 0.55 m before the leaf to 240 m, evenly in log distance, rising while it goes."""
-    near, far = 0.55, 240.0
+def camera_path(target, frames, near=0.55, far=240.0):
+    """From `near` metres before the leaf to `far`, evenly in log distance, rising while it goes."""
     path = []
     for n in range(frames):
         t = n / (frames - 1)

@@ -56,6 +56,7 @@ Json level_json(const Manifest& manifest, const LevelEntry& level) {
                {"bytes_build_peak", level.build_peak_bytes},
                {"file", level.file},
                {"file_hash", to_hex(level.file_hash)}};
+  if (level.ray_cost > 0) json["ray_cost"] = level.ray_cost;
   if (level.errors) {
     json["occlusion_error"] = level.errors->occlusion_error;
     put_size(json, "occlusion_rms", level.errors->occlusion_rms);

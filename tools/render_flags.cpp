@@ -58,7 +58,9 @@ void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::
                       "Folder of baked assets; what is missing is baked. Without it farfield-assets beside the scene");
   add_parsed_option(command, "--blend", options.blend, parse_blend, "How neighbouring levels are mixed: dissolve")
       ->default_str("dissolve");
-  command->add_option("--lod-scale", options.lod_scale, "Multiplies footprints: above 1 coarser and cheaper")
+  command
+      ->add_option("--pixel-error", options.pixel_error,
+                   "How wide voxels may look, in pixels: above 1 coarser, below 1 finer")
       ->check(is_scale)
       ->capture_default_str();
   command->add_flag("--full-detail", options.full_detail, "Render the sources, without levels, for comparison");

@@ -61,7 +61,7 @@ struct RuntimeOptions {
   uint64_t budget_bytes = uint64_t{1} << 32;  ///< hard: mapped, heap and Embree bytes together, build peaks included
   Blend blend = Blend::Dissolve;
   Residency residency = Residency::Wait;
-  float lod_scale = 1.0f;              ///< multiplies every footprint: > 1 coarser and cheaper, < 1 finer; > 0
+  float pixel_error = 1.0f;            ///< pixels: how wide the voxels of a level may look; the budget aside. > 0
   std::optional<float> forced_lambda;  ///< every ray sees this lambda, whatever its footprint; for evaluation
   MessageSink messages;                ///< may be empty
 };
@@ -88,6 +88,8 @@ struct PlanSummary {
   std::vector<uint32_t> finest_level;  ///< per asset: k of the finest level that rays may use
   uint64_t planned_bytes = 0;  ///< if everything the plan allows were loaded, build peak included; <= the budget
   double bias = 0;             ///< pixel-weighted mean of how many levels coarser than asked; 0: nothing given up
+  std::vector<float> levels_given_up;  ///< per asset: how many levels coarser than its finest instances ask
+  uint64_t asked_bytes = 0;            ///< a budget that gives nothing up in this frame
 };
 
 /// Counters since create(). Thread-safe snapshot.
@@ -106,7 +108,7 @@ struct Stats {
 class FARFIELD_API Runtime {
  public:
   /// host_device: the device of the scene that attach() will be given; retained. Errors: InvalidArgument (budget 0,
-  /// lod_scale <= 0).
+  /// pixel_error <= 0).
   static Result<std::unique_ptr<Runtime>> create(RTCDevice host_device, const RuntimeOptions& options);
   ~Runtime();
   Runtime(const Runtime&) = delete;

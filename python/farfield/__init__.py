@@ -278,7 +278,7 @@ def render(
     transparent: bool = False,
     max_depth: int = 64,
     seed: int = 0,
-    lod_scale: float = 1.0,
+    pixel_error: float = 1.0,
     budget: int = 4 << 30,
     threads: int = 0,
     progress: Progress | None = None,
@@ -305,7 +305,7 @@ def render(
         raise ValueError(f"fov_y is {fov_y}; it is an angle in radians between 0 and pi")
     view = {"width": width, "height": height, "eye": eye, "target": target, "up": up, "fov_y": fov_y,
             "samples": samples, "seed": seed, "max_depth": max_depth, "transparent": transparent,
-            "budget_bytes": budget, "lod_scale": lod_scale, "level": level, "threads": threads}
+            "budget_bytes": budget, "pixel_error": pixel_error, "level": level, "threads": threads}
     look = os.fspath(light) if isinstance(light, os.PathLike) else light
     return _farfield.render(arrays, view, list(channels), look, progress, _warn)
 

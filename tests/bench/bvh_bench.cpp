@@ -115,6 +115,7 @@ class Bench : public LevelSource {
     asset->bounds = padded_bounds(data_.back()->header.bounds);
     asset->base_resolution = 0.01f;
     asset->level_numbers = {static_cast<float>(data_.back()->header.level)};
+    asset->usable_slots = {0};
     asset->loaded = std::make_unique<std::atomic<const TracedLevel*>[]>(1);
     surface_geometry_->assets.push_back(asset.get());
     volume_geometry_->assets.push_back(asset.get());

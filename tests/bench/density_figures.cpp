@@ -45,6 +45,7 @@ SparseVolume volume_of(const LevelView& level) {
       Voxel voxel;
       voxel.density = static_cast<float>(density) / 255.0f * brick.density_scale;
       voxel.sggx = level.voxel_sggx.empty() ? SymMat3::identity() : unpack(level.voxel_sggx[brick.payload_index(i)]);
+      if (!level.voxel_octants.empty()) voxel.octants = level.voxel_octants[brick.payload_index(i)];
       volume.voxels.push_back(voxel);
     }
   }

@@ -4,6 +4,8 @@
 //   level_bench ASSET.farfield [ROUNDS]
 // Speeds are ratios: medians over rounds of CPU time of the other / of the level, all variants in turn in each round,
 // so that a busy machine slows all alike. Above 1: the level is faster. `hits` are the level's and the source's.
+// Then what the bake counts (bvh/ray_cost.h) beside what one instance took, over all kinds of rays, and how well the
+// two agree on the order of levels (Spearman's rank correlation).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,6 +15,7 @@
 #include <memory>
 
 #include "bvh/instance_geometry.h"
+#include "bvh/ray_cost.h"
 #include "cache/level_file.h"
 #include "scattering/warp.h"
 #include "tests/support/random_unit.h"
@@ -56,6 +59,7 @@ class LevelAsset : public LevelSource {
     asset_.bounds = padded_bounds(view().header.bounds);
     asset_.base_resolution = 1;
     asset_.level_numbers = {0.0f};
+    asset_.usable_slots = {0};
     asset_.loaded = std::make_unique<std::atomic<const TracedLevel*>[]>(1);
     asset_.loaded[0].store(level_.get());
   }
@@ -160,9 +164,9 @@ int trace(EmbreeSceneRef scene, const RaySet& set) {
   return hits;
 }
 
-/// scenes: the source, then the levels, finest first.
-void measure(const RaySet& set, const std::vector<EmbreeScene>& scenes, const std::vector<uint32_t>& numbers, int side,
-             int rounds) {
+/// scenes: the source, then the levels, finest first. The levels' times, nanoseconds per ray.
+std::vector<double> measure(const RaySet& set, const std::vector<EmbreeScene>& scenes,
+                            const std::vector<uint32_t>& numbers, int side, int rounds) {
   std::vector<std::vector<double>> seconds(scenes.size());
   std::vector<int> hits(scenes.size());
   for (int round = 0; round < rounds; ++round) {
@@ -185,6 +189,42 @@ void measure(const RaySet& set, const std::vector<EmbreeScene>& scenes, const st
                1e9 * median(seconds[i]) / kRays, ratio(0, i), i > 1 ? ratio(i - 1, i) : ratio(0, i), hit_share(i),
                hit_share(0));
   }
+  std::vector<double> nanoseconds;
+  for (size_t i = 1; i < scenes.size(); ++i) nanoseconds.push_back(1e9 * median(seconds[i]) / kRays);
+  return nanoseconds;
+}
+
+/// Position of each value in the sorted list.
+std::vector<double> ranks_of(const std::vector<double>& values) {
+  std::vector<double> ranks;
+  for (const double value : values) {
+    ranks.push_back(static_cast<double>(std::ranges::count_if(values, [&](double other) { return other < value; })));
+  }
+  return ranks;
+}
+
+/// Spearman's; of values without ties.
+double rank_correlation(const std::vector<double>& a, const std::vector<double>& b) {
+  const std::vector<double> ranks_a = ranks_of(a), ranks_b = ranks_of(b);
+  double sum = 0;
+  for (size_t i = 0; i < a.size(); ++i) sum += (ranks_a[i] - ranks_b[i]) * (ranks_a[i] - ranks_b[i]);
+  const auto n = static_cast<double>(a.size());
+  return n > 1 ? 1 - 6 * sum / (n * (n * n - 1)) : 1.0;
+}
+
+void compare_with_count(const std::vector<std::unique_ptr<LevelAsset>>& levels,
+                        const std::vector<double>& nanoseconds) {
+  fmt::print("\n| level | ns per ray | counted | boxes | quads | bricks | voxels | collisions |\n");
+  fmt::print("|---|---|---|---|---|---|---|---|\n");
+  std::vector<double> counted;
+  for (size_t i = 0; i < levels.size(); ++i) {
+    const RayWork work = count_ray_work(levels[i]->view());
+    counted.push_back(ray_cost(work));
+    fmt::print("| {} | {:.0f} | {:.0f} | {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.2f} |\n",
+               levels[i]->view().header.level, nanoseconds[i], counted[i], work.boxes, work.quads, work.bricks,
+               work.voxels, work.collisions);
+  }
+  fmt::print("Rank correlation: {:.2f}\n", rank_correlation(nanoseconds, counted));
 }
 
 int run(const std::filesystem::path& folder, int rounds) {
@@ -208,13 +248,21 @@ int run(const std::filesystem::path& folder, int rounds) {
   fmt::print(
       "| instances | rays | level | ns per ray | speed / source | / finer | hits |\n|---|---|---|---|---|---|---|\n");
   const Box3 bounds = levels[0]->view().header.bounds;
+  std::vector<double> of_one(levels.size(), 0.0);  // mean over kinds of rays
   for (const int side : {1, 10}) {
     const std::vector<mat4x3> places = field(bounds, side);
     std::vector<EmbreeScene> scenes;
     scenes.push_back(native_scene(host.get(), levels[0]->view(), places));
     for (const auto& level : levels) scenes.push_back(level->scene(host.get(), places));
-    for (const RaySet& set : make_rays(scenes[0].get(), bounds, side)) measure(set, scenes, numbers, side, rounds);
+    const std::vector<RaySet> sets = make_rays(scenes[0].get(), bounds, side);
+    for (const RaySet& set : sets) {
+      const std::vector<double> nanoseconds = measure(set, scenes, numbers, side, rounds);
+      for (size_t i = 0; i < levels.size() && side == 1; ++i) {
+        of_one[i] += nanoseconds[i] / static_cast<double>(sets.size());
+      }
+    }
   }
+  compare_with_count(levels, of_one);
   return 0;
 }
 

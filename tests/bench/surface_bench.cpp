@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long do macrosurface analysis and simplification take, and does the work per face stay bounded when the source is
-// much finer than the resolution? Run: build/release/bin/surface_bench (thesis: 15 us per face, 170 us per collapse).
+// How long do the steps of a bake take that grow with the faces: macrosurface analysis, simplification, marking voxels?
+// Does the work per face stay bounded when the source is much finer than the resolution, or much coarser? And how near
+// is voxelisation to what Embree alone needs for as many rays? Run: build/release/bin/surface_bench (thesis: 15 us per
+// face, 170 us per collapse).
 #include <benchmark/benchmark.h>
 
+#include "base/random.h"
 #include "prefilter/macrosurface.h"
 #include "prefilter/simplify.h"
+#include "prefilter/voxel_marks.h"
 #include "tests/support/surfaces.h"
 
 namespace farfield {
@@ -34,11 +38,40 @@ void simplify_surface(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<int64_t>(collapses));  // items: collapses
 }
 
+/// Straight hairs across a cube of side 1, two triangles each.
+Surface make_hair(int hairs) {
+  Surface surface;
+  Rng rng(1);
+  const vec3 width(0.0005f, 0.0f, 0.0005f);
+  for (int i = 0; i < hairs; ++i) {
+    const vec3 root(rng.next(), 0.0f, rng.next()), tip(rng.next(), 1.0f, rng.next());
+    const auto first = static_cast<uint32_t>(surface.positions.size());
+    surface.positions.insert(surface.positions.end(), {root, root + width, tip + width, tip});
+    surface.triangles.insert(surface.triangles.end(), {uvec3(0, 1, 2) + first, uvec3(0, 2, 3) + first});
+  }
+  surface.materials.resize(surface.triangles.size());
+  return surface;
+}
+
+/// Arguments: hairs; voxels along one.
+void mark_hair(benchmark::State& state) {
+  const Surface hair = make_hair(static_cast<int>(state.range(0)));
+  const VoxelLattice lattice{dvec3(0.0), 1.0 / static_cast<double>(state.range(1))};
+  for (auto _ : state) benchmark::DoNotOptimize(mark_voxels(hair, lattice));
+  state.SetItemsProcessed(state.iterations() * static_cast<int64_t>(hair.triangles.size()));
+}
+
 BENCHMARK(classify)
     ->ArgNames({"faces", "grid"})
     ->Args({200'000, 512})
     ->Args({200'000, 64})
     ->Args({200'000, 8})
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime();
+BENCHMARK(mark_hair)
+    ->ArgNames({"hairs", "grid"})
+    ->Args({100'000, 64})
+    ->Args({100'000, 512})
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime();
 BENCHMARK(simplify_surface)

@@ -38,8 +38,8 @@ struct Comparison {
       if (const auto hit = macrosurface->first_stop(origin, direction, far, random)) far = wall = hit->distance;
     }
     VoxelRay ray{(dvec3(origin) - volume.lattice.origin) / size, dvec3(direction), 0, far / size};
-    grid.walk(ray, [&](uint32_t v, double enter, double leave) {
-      visit(enter * size, (leave - enter) * size * sigma_of(volume.voxels[v], direction));
+    walk_octant_depths(volume, grid, ray, [&](const OctantStretch& at, double depth) {
+      visit(at.enter * size, depth);
       return true;
     });
     return wall;

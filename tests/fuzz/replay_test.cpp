@@ -48,7 +48,7 @@ TEST(FuzzReplay, LevelFile) {
   run(fuzz_level_file, {});
   EXPECT_GT(run_folder(fuzz_level_file, FARFIELD_FUZZ_REGRESSIONS "/level_file"), 0);
   run_damaged(fuzz_level_file, FARFIELD_TEST_DATA "/format_v1/level_3.ffl");
-  run_damaged(fuzz_level_file, FARFIELD_TEST_DATA "/format_v3/level_3.ffl");
+  run_damaged(fuzz_level_file, FARFIELD_TEST_DATA "/format_v4/level_3.ffl");
 }
 
 TEST(FuzzReplay, Manifest) {

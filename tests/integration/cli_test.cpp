@@ -88,8 +88,8 @@ TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
       {"--json", "--mesh", "--node"},
       {},
       {"--source", "--other-source", "--levels", "--views", "--spp", "--json", "--sheet", "--images"},
-      {"--frame", "--size", "--spp", "--budget", "--assets", "--blend", "--lod-scale", "--full-detail", "--output"},
-      {"--frames", "--size", "--spp", "--budget", "--assets", "--blend", "--lod-scale", "--full-detail", "--output"},
+      {"--frame", "--size", "--spp", "--budget", "--assets", "--blend", "--pixel-error", "--full-detail", "--output"},
+      {"--frames", "--size", "--spp", "--budget", "--assets", "--blend", "--pixel-error", "--full-detail", "--output"},
       {"--output", "--width"}};
   for (size_t i = 0; i < kCommands.size(); ++i) {
     const ProcessOutput help = farfield({kCommands[i], "--help"});
@@ -137,8 +137,8 @@ TEST(Usage, NonsenseIsOneLineThatPointsToTheHelp) {
       {"render", "a.glb", "-o", "b.exr", "--budget", "lots"},
       {"render", "a.glb", "-o", "b.exr", "--budget", "-4G"},
       {"render", "a.glb", "-o", "b.exr", "--blend", "stir"},
-      {"render", "a.glb", "-o", "b.exr", "--lod-scale", "0"},
-      {"render", "a.glb", "-o", "b.exr", "--lod-scale", "nan"},
+      {"render", "a.glb", "-o", "b.exr", "--pixel-error", "0"},
+      {"render", "a.glb", "-o", "b.exr", "--pixel-error", "nan"},
       {"render", "a.glb", "-o", "b.exr", "--frame", "-1"},
       {"render", "a.glb", "-o", "b.exr", "--spp", "0"},
       {"render", "a.glb", "-o", "b.exr", "--fps", "0"},

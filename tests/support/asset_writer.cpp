@@ -24,7 +24,9 @@ T or_stop(Result<T> result) {
 }
 
 /// More than the file, as the runtime's answer would be; for readers of manifests, who build no scene.
-LevelCost assumed_cost(const LevelView& level) { return {layout_of(level).file_bytes + 1000, 100}; }
+LevelCost assumed_cost(const LevelView& level) {
+  return {round_up(layout_of(level).file_bytes, kPageBytes) + 1000, 100};
+}
 
 /// Writes a level's file, fills in what its entry says of it, extends the asset's bounds by it.
 void write_entry(const std::filesystem::path& folder, const LevelData& level, const MeasureLevel& measure,

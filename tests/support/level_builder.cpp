@@ -245,6 +245,13 @@ LevelData full_level_of_version_3() {
   return level;
 }
 
+LevelData full_level_of_version_4() {
+  LevelData level = full_level_of_version_3();
+  level.voxel_octants = counted<PackedOctants>(5, 18);
+  level.header.open_side = {0.1f, -0.2f, 0.3f};
+  return level;
+}
+
 LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks) {
   Rng rng(seed);
   LevelData level;
@@ -301,6 +308,7 @@ LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks) {
     }
   }
   if (bricks > 0 && has()) level.header.hot_spot = 0.5f * rng.next();
+  if (has()) level.voxel_octants = noise<PackedOctants>(voxel_count(level), rng);
   return level;
 }
 

@@ -10,8 +10,9 @@
 
 namespace farfield::test {
 
-/// The attenuation coefficient that voxel (x, y, z) really has after packing, towards unit direction w.
-inline double attenuation(const LevelData& level, const ivec3& voxel, const vec3& w) {
+/// The attenuation coefficient that the level really has after packing, towards unit direction w; at a point in voxels,
+/// in voxel (x, y, z).
+inline double attenuation(const LevelData& level, const glm::dvec3& point, const ivec3& voxel, const vec3& w) {
   const ivec3 n = level.header.brick_dims;
   const ivec3 b = voxel / kBrickSide;
   const uint32_t index = level.brick_table[static_cast<size_t>(b.x + n.x * (b.y + n.y * b.z))];
@@ -21,7 +22,12 @@ inline double attenuation(const LevelData& level, const ivec3& voxel, const vec3
   const int i = local.x + 8 * (local.y + 8 * local.z);
   const uint8_t density = brick.density[static_cast<size_t>(i)];
   if (density == 0) return 0.0;
-  const double rho = density / 255.0 * static_cast<double>(brick.density_scale);
+  double rho = density / 255.0 * static_cast<double>(brick.density_scale);
+  if (!level.voxel_octants.empty()) {
+    const glm::dvec3 in_voxel = point - glm::dvec3(voxel);
+    const int octant = (in_voxel.x >= 0.5) + 2 * (in_voxel.y >= 0.5) + 4 * (in_voxel.z >= 0.5);
+    rho *= static_cast<double>(kOctantShares[level.voxel_octants[brick.payload_index(i)] >> (2 * octant) & 3]);
+  }
   if (level.voxel_sggx.empty()) return rho;
   const SymMat3 s = unpack(level.voxel_sggx[brick.payload_index(i)]);
   return rho * std::sqrt(std::max(0.0, static_cast<double>(s.quadratic(w))));
@@ -41,7 +47,7 @@ inline double optical_depth(const LevelData& level, const vec3& origin, const ve
     const ivec3 voxel(glm::floor(p));
     bool inside = true;
     for (int axis = 0; axis < 3; ++axis) inside = inside && voxel[axis] >= 0 && voxel[axis] < count[axis];
-    if (inside) depth += attenuation(level, voxel, w) * speed * t_end / steps;
+    if (inside) depth += attenuation(level, p, voxel, w) * speed * t_end / steps;
   }
   return depth;
 }

@@ -63,8 +63,12 @@ class VolumeScene {
       const dvec3 p = (dvec3(origin) + t * dvec3(direction) - volume_.lattice.origin) / volume_.lattice.voxel_size;
       const ivec3 c = ivec3(glm::floor(p)) - lower_;
       if (glm::any(glm::lessThan(c, ivec3(0))) || glm::any(glm::greaterThanEqual(c, size_))) continue;
-      if (const Voxel* voxel = at(c))
-        depth += step * voxel->density * std::sqrt(std::max(voxel->sggx.quadratic(direction), 0.0f));
+      const Voxel* voxel = at(c);
+      if (!voxel) continue;
+      const dvec3 in_voxel = glm::fract(p);
+      const int octant = (in_voxel.x >= 0.5) + 2 * (in_voxel.y >= 0.5) + 4 * (in_voxel.z >= 0.5);
+      depth += step * octant_share(voxel->octants, octant) * voxel->density *
+               std::sqrt(std::max(voxel->sggx.quadratic(direction), 0.0f));
     }
     return std::exp(-depth);
   }

@@ -22,23 +22,33 @@ using test::set_volume;
 constexpr float kInf = std::numeric_limits<float>::infinity();
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
+struct Cloud {
+  bool anisotropic, octants;
+  float density = 2;  ///< at most
+};
+
 /// 2 x 1 x 2 bricks of 0.25 units, one brick empty, densities that vary and vanish.
-LevelData cloud(bool anisotropic) {
+LevelData cloud(const Cloud& of) {
   LevelData level = empty_level(1, 0.25f);
-  const auto density = [](int x, int y, int z) {
+  const auto density = [&](int x, int y, int z) {
     if (x >= 8 && z < 8) return 0.0f;
     const float u = to_unit_float(mix64(static_cast<uint64_t>(x + 100 * y), static_cast<uint64_t>(z)));
-    return u < 0.4f ? 0.0f : 2.0f * u;
+    return u < 0.4f ? 0.0f : of.density * u;
   };
   const auto sggx = [](int x, int y, int z) {
     Rng rng(mix64(static_cast<uint64_t>(x + 100 * y), static_cast<uint64_t>(z + 7)));
     const SymMat3 s = SymMat3::outer(random_unit(rng)) + SymMat3::identity() * (0.2f * rng.next());
     return s;
   };
-  if (anisotropic) {
+  if (of.anisotropic) {
     set_volume(level, {2, 1, 2}, {-1.0f, 2.0f, 0.5f}, density, sggx);
   } else {
     set_volume(level, {2, 1, 2}, {-1.0f, 2.0f, 0.5f}, density);
+  }
+  if (of.octants) {
+    level.voxel_octants.resize(voxel_count(level));
+    for (size_t i = 0; i < level.voxel_octants.size(); ++i)
+      level.voxel_octants[i] = static_cast<PackedOctants>(mix64(3, i));
   }
   return level;
 }
@@ -63,7 +73,7 @@ double transmittance_z(const BrickVolume& volume, const LocalRay& ray, double de
 // 60 z-tests per case at 4.5 sigma: a false alarm in 1 of 2500 for other seeds.
 constexpr double kSigma = 4.5;
 
-class Transmittance : public ::testing::TestWithParam<bool> {};
+class Transmittance : public ::testing::TestWithParam<Cloud> {};
 
 TEST_P(Transmittance, IsTheExponentialOfTheBruteForceOpticalDepth) {
   const LevelData level = cloud(GetParam());
@@ -99,10 +109,14 @@ TEST_P(Transmittance, HasCollisionsWhereTheOpticalDepthGrows) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(IsotropicAndAnisotropic, Transmittance, ::testing::Bool());
+// Faint bricks are skimmed, others crossed.
+INSTANTIATE_TEST_SUITE_P(Clouds, Transmittance,
+                         ::testing::Values(Cloud{false, false}, Cloud{true, false}, Cloud{false, true},
+                                           Cloud{true, true}, Cloud{true, true, 0.4f}, Cloud{false, true, 0.4f},
+                                           Cloud{true, true, 40}));
 
 TEST(BrickVolume, CollisionsLieInTheVoxelOfTheirPayload) {
-  const LevelData level = cloud(true);
+  const LevelData level = cloud({true, true});
   const BrickVolume volume(view_of(level));
   Rng rng(5);
   int hits = 0;
@@ -182,7 +196,7 @@ TEST(BrickVolume, DiagonalsThroughVoxelCornersSeeTheirLength) {
 }
 
 TEST(BrickVolume, TheLengthOfTheDirectionOnlyScalesT) {
-  const LevelData level = cloud(true);
+  const LevelData level = cloud({true, true});
   const BrickVolume volume(view_of(level));
   Rng rng(9);
   int hits = 0;
@@ -203,7 +217,7 @@ TEST(BrickVolume, TheLengthOfTheDirectionOnlyScalesT) {
 }
 
 TEST(BrickVolume, ShorteningTheRayBehindTheCollisionChangesNothing) {
-  const LevelData level = cloud(true);
+  const LevelData level = cloud({true, true});
   const BrickVolume volume(view_of(level));
   Rng rng(10);
   for (uint64_t i = 0; i < 5000; ++i) {

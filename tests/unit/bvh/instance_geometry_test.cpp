@@ -48,6 +48,7 @@ class Stage : public LevelSource {
     for (const LevelData* level : levels) {
       asset->bounds.extend(level->header.bounds);
       asset->level_numbers.push_back(static_cast<float>(level->header.level));
+      asset->usable_slots.push_back(static_cast<uint8_t>(asset->usable_slots.size()));
     }
     asset->bounds = padded_bounds(asset->bounds);
     levels_.emplace_back(levels);

@@ -10,6 +10,9 @@ TracedAsset asset_with(std::vector<float> numbers) {
   TracedAsset asset;
   asset.base_resolution = 0.01f;
   asset.level_numbers = std::move(numbers);
+  for (size_t slot = 0; slot < asset.level_numbers.size(); ++slot) {
+    asset.usable_slots.push_back(static_cast<uint8_t>(slot));
+  }
   return asset;
 }
 
@@ -52,6 +55,21 @@ TEST(LevelChoice, FinerLevelServesAcrossAGapUntilTheLastOctave) {
   EXPECT_NEAR(share[2], 0.25, 0.018);
 }
 
+TEST(LevelChoice, LevelsThatThePlanLeavesOutAreAsIfNotStored) {
+  TracedAsset asset = asset_with({0, 1, 2, 3, 4, 5});
+  asset.usable_slots = {1, 5};
+  EXPECT_NEAR(shares(asset, 3.99f)[1], 1.0, 1e-9);
+  const std::vector<double> share = shares(asset, 4.25f);
+  EXPECT_NEAR(share[1], 0.75, 0.018);
+  EXPECT_NEAR(share[5], 0.25, 0.018);
+  RayContext ray = path(1);
+  HitRecord hit;
+  hit.instance = 7;
+  hit.level_slot = 3;  // of an earlier plan
+  ray.set_origin(hit);
+  EXPECT_EQ(choose_level(asset, {}, 7, ray, 0.0f, 1.0f).slot, 5u);
+}
+
 TEST(LevelChoice, TheSamePathNeverGoesBackToAFinerLevelAsLambdaGrows) {
   const TracedAsset asset = asset_with({0, 1, 2, 4, 5});
   for (uint32_t seed = 0; seed < 200; ++seed) {
@@ -92,7 +110,7 @@ TEST(LevelChoice, PathAndInstanceDecideAndNothingElse) {
 
 TEST(LevelChoice, ThePlanClampsLambda) {
   TracedAsset asset = asset_with({0, 1, 2, 3});
-  asset.finest_slot = 2;
+  asset.usable_slots = {2, 3};
   for (const float lambda : {0.0f, 0.7f, 1.99f, 2.0f}) {
     const LevelChoice choice = choose_level(asset, {}, 1, path(1), 0.0f, lambda);
     EXPECT_EQ(choice.slot, 2u);
@@ -110,14 +128,14 @@ TEST(LevelChoice, TakesTheWiderOfCameraAndCone) {
   EXPECT_NEAR(choose_level(asset, camera, 1, ray, 1.0f, std::nullopt).lambda, 2.0f, 1e-4f);
   ray.cone_width = 0.32f;
   EXPECT_NEAR(choose_level(asset, camera, 1, ray, 0.0f, std::nullopt).lambda, 5.0f, 1e-4f);
-  // An instance twice as large needs one level finer; lod_scale 4 makes it two levels coarser.
+  // An instance twice as large needs one level finer; pixel_error 4 makes it two levels coarser.
   EXPECT_NEAR(choose_level(asset, {0.04f, 0.5f}, 1, path(1), 0.0f, std::nullopt).lambda, 1.0f, 1e-4f);
   EXPECT_NEAR(choose_level(asset, {0.04f, 4.0f}, 1, path(1), 0.0f, std::nullopt).lambda, 4.0f, 1e-4f);
 }
 
 TEST(LevelChoice, RaysThatLeaveAHitKeepItsLevelOnThatInstanceOnly) {
   TracedAsset asset = asset_with({0, 1, 2, 3});
-  asset.finest_slot = 1;
+  asset.usable_slots = {1, 2, 3};
   HitRecord hit;
   hit.instance = 4;
   hit.level_slot = 1;

@@ -33,6 +33,7 @@ void expect_same(const LevelView& a, const LevelView& b) {
   EXPECT_EQ(a.header.brick_dims, b.header.brick_dims);
   EXPECT_EQ(a.header.volume_origin, b.header.volume_origin);
   EXPECT_EQ(a.header.hot_spot, b.header.hot_spot);
+  EXPECT_EQ(a.header.open_side, b.header.open_side);
   std::vector<std::span<const std::byte>> sections;
   for_each_section(a, [&](SectionId, const auto& array) { sections.push_back(std::as_bytes(array)); });
   size_t i = 0;
@@ -142,6 +143,16 @@ TEST(LevelFormat, GoldenBytesOfVersion2AreFrozen) {
 
 TEST(LevelFormat, GoldenBytesOfVersion3AreFrozen) {
   expect_frozen("/format_v3/level_3.ffl", 4288u, test::full_level_of_version_3());
+}
+
+TEST(LevelFormat, GoldenBytesOfVersion4AreFrozen) {
+  expect_frozen("/format_v4/level_3.ffl", 4416u, test::full_level_of_version_4());
+}
+
+TEST(LevelFormat, OctantsMustBelongToVoxels) {
+  LevelData level = test::full_level_of_version_4();
+  level.voxel_octants.pop_back();
+  EXPECT_EQ(find_structure_problem(view_of(level)).value_or(""), "voxel_octants has 4 elements for 5 voxels");
 }
 
 TEST(LevelFormat, GapsMustBelongToFaces) {
@@ -279,13 +290,15 @@ TEST(HostileLevelFile, HeaderAndTableFieldsAreChecked) {
   const std::vector<Case> cases = {
       {"does not start as a level file", [](auto& h, auto*) { h.magic[1] = 'X'; }},
       {"the format version is 0", [](auto& h, auto*) { h.version = 0; }},
-      {"level format 4, and this Farfield reads up to 3", [](auto& h, auto*) { h.version = 4; },
+      {"level format 5, and this Farfield reads up to 4", [](auto& h, auto*) { h.version = 5; },
        ErrorCode::Unsupported},
       {"the header says", [](auto& h, auto*) { h.file_bytes = kHuge; }},
       {"sections leaves the file", [](auto& h, auto*) { h.section_count = 0xffffffffu; }},
-      {"reserved bytes", [](auto& h, auto*) { h.reserved[35] = 1; }},
+      {"reserved bytes", [](auto& h, auto*) { h.reserved[23] = 1; }},
       {"the hot spot's strength is -0.1", [](auto& h, auto*) { h.hot_spot = -0.1f; }},
       {"the hot spot's strength is 0.71", [](auto& h, auto*) { h.hot_spot = 0.71f; }},
+      {"the open side is (0, 0.6, 0)", [](auto& h, auto*) { h.open_side = {0, 0.6f, 0}; }},
+      {"the open side is (nan, 0, 0)", [](auto& h, auto*) { h.open_side = {NAN, 0, 0}; }},
       {"the hot spot's strength is nan", [](auto& h, auto*) { h.hot_spot = NAN; }},
       {"the resolution is 0", [](auto& h, auto*) { h.resolution = 0; }},
       {"the resolution is nan", [](auto& h, auto*) { h.resolution = NAN; }},

@@ -26,6 +26,13 @@ TEST(LevelStats, CountWhatASmallLevelHolds) {
   EXPECT_NEAR(stats.mean_optical_depth, stats.mean_density * 0.25, 1e-12);
 }
 
+TEST(LevelStats, DensitiesAreTheMeanOfOctants) {
+  LevelData level = test::full_level();
+  level.voxel_octants.assign(5, kFullOctants);
+  level.voxel_octants[0] = 0x000f;  // a quarter, of the densest
+  EXPECT_NEAR(level_stats(view_of(level)).mean_density, ((255 / 4.0 + 10) * 2.5 + 300 * 0.125) / 255.0 / 5.0, 1e-12);
+}
+
 TEST(LevelStats, SectionsAddUpToTheFile) {
   for (uint64_t seed = 1; seed < 20; ++seed) {
     const LevelData level = test::random_level(seed, 100, 5);

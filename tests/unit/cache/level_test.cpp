@@ -97,7 +97,7 @@ TEST(Brick, PayloadIndicesOfTheActiveVoxelsCountUp) {
 }
 
 TEST(LevelView, ShowsEveryArrayOfItsLevel) {
-  const LevelData level = test::full_level_of_version_3();
+  const LevelData level = test::full_level_of_version_4();
   const LevelView view = view_of(level);
   std::vector<std::span<const std::byte>> owned, seen;
   for_each_section(level, [&](SectionId, const auto& array) { owned.push_back(std::as_bytes(std::span(array))); });
@@ -124,7 +124,7 @@ TEST(SectionName, IsDifferentForEachSection) {
   std::set<std::string_view> names;
   const LevelView view;
   for_each_section(view, [&](SectionId id, const auto&) { names.insert(section_name(id)); });
-  EXPECT_EQ(names.size(), 28u);
+  EXPECT_EQ(names.size(), 29u);
   EXPECT_FALSE(names.contains(section_name(SectionId{0})));
 }
 

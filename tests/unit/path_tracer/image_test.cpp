@@ -73,7 +73,7 @@ TEST(Exr, ReturnsMetadata) {
   const test::TemporaryFolder folder;
   const Metadata metadata = {{"camera.position", vec3(1.5f, -2.0f, 1e7f)},
                              {"farfield.frame", 42},
-                             {"farfield.lod_scale", 0.1f},
+                             {"farfield.pixel_error", 0.1f},
                              {"farfield.scene", std::string("forest \"x\" \u00e4.glb")},
                              {"empty", std::string()}};
   ASSERT_TRUE(write_exr(folder.path() / "a.exr", noise_image(2, 2, {"R", "G", "B"}), metadata));

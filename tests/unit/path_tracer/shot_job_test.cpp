@@ -296,7 +296,7 @@ TEST_F(Shot, FramesSayWhatTheCameraSees) {
     EXPECT_EQ(file->metadata.at(key), text) << key;
 
   options_.full_detail = false;
-  options_.lod_scale = 1e6f;
+  options_.pixel_error = 1e6f;
   ASSERT_TRUE(render_frame(options_, 0, folder_.path() / "coarse.exr"));
   const auto coarse = read_exr(folder_.path() / "coarse.exr");
   ASSERT_TRUE(coarse) << coarse.error().message;

@@ -18,7 +18,9 @@ FrameReport frame_report(int frame) {
   report.levels_loaded = 3;
   report.rays = uint64_t{1} << 40;
   report.bias = 0.125;
+  report.asked_bytes = 4321;
   report.finest_level = {1, 4};
+  report.levels_given_up = {0, 1.5f};
   return report;
 }
 
@@ -49,6 +51,8 @@ TEST(ShotRecord, HasTheKeysThatChecksRead) {
   EXPECT_EQ(frame["load_seconds"], 0.25);
   EXPECT_EQ(frame["accounted_bytes"], uint64_t{5} << 32);
   EXPECT_EQ(frame["bias"], 0.125);
+  EXPECT_EQ(frame["asked_bytes"], 4321);
+  EXPECT_EQ(frame["levels_given_up"]["ground"], 1.5);
   EXPECT_EQ(frame["finest_level"]["ground"], 4);
 }
 

@@ -88,6 +88,31 @@ TEST(AlphaCut, CoverageOfRandomBlobsIsTheShareOfTexelsAboveTheCutoff) {
   }
 }
 
+TEST(AlphaCut, CoarseOutlinesHaveFewTrianglesAndTheSameArea) {
+  // A flower of seven petals; chords of 12 texels, which alone would lose a percent and more.
+  const SourceMaterial m = shape(512, [](float u, float v) {
+    return 0.3f + 0.12f * std::sin(7 * std::atan2(v - 0.5f, u - 0.5f)) - std::hypot(u - 0.5f, v - 0.5f);
+  });
+  size_t fine = 0, coarse = 0;
+  const MaskedTriangle card[] = {kLower, kUpper};
+  const int n = cut_subdivisions(m, card);
+  for (const MaskedTriangle& t : card) {
+    const CutPattern exact = cut_by_mask(m, t, n, 0.25), rough = cut_by_mask(m, t, n, 12);
+    EXPECT_NEAR(rough.coverage, exact.coverage, 0.006f * exact.coverage);
+    fine += exact.triangles.size();
+    coarse += rough.triangles.size();
+  }
+  EXPECT_LT(4 * coarse, fine) << coarse << " and " << fine;
+}
+
+TEST(AlphaCut, TexelsAreMeasuredOnTheTriangle) {
+  const SourceMaterial m = masked(8, [](float, float) { return 1.0f; });
+  const std::array<vec3, 3> corners = {vec3(0, 0, 0), vec3(16, 0, 0), vec3(16, 4, 0)};
+  EXPECT_NEAR(texel_size(m, kLower, corners), 2, 1e-6);
+  EXPECT_EQ(texel_size(m, {{vec2(0, 0), vec2(0, 0), vec2(1, 1)}}, corners), 0);
+  EXPECT_EQ(texel_size(m, {{vec2(NAN, 0), vec2(1, 0), vec2(0, 1)}}, corners), 0);
+}
+
 TEST(AlphaCut, TrianglesOfThePiecesAreWoundLikeTheWholeAndDoNotOverlap) {
   // Not overlapping: none is turned over and the areas add up to the coverage, which the outline alone gives.
   const SourceMaterial m =

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+
 #include <algorithm>
 #include <random>
 
@@ -174,6 +176,12 @@ TEST(Macrosurface, ExtremesHaveDefinedAnswers) {
   EXPECT_EQ(macrosurface_part(make_plane(4, 4, 1e-30f, 1e-30f), 1e-33f), 1.0);
   EXPECT_EQ(macrosurface_part(make_plane(1, 1, 0.0f, 0.0f), 1.0f), 0.0);    // all vertices in one point
   EXPECT_EQ(macrosurface_part(make_plane(30, 1, 1.0f, 0.0f), 10.0f), 0.0);  // all faces without area
+}
+
+TEST(Macrosurface, EndsOnceCancelled) {
+  const std::atomic<bool> cancel{true};
+  const Surface sphere = test::make_sphere(32, 16, 1.0f);
+  EXPECT_EQ(classify_macrosurface(sphere, 0.1f, {{}, &cancel}), std::vector<uint8_t>(sphere.triangles.size(), 0));
 }
 
 }  // namespace

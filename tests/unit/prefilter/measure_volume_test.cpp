@@ -26,6 +26,8 @@ SparseVolume measured(const Surface& geometry, double voxel_size, const Surface&
   return std::move(*volume);
 }
 
+double mean_density(const Voxel& v) { return static_cast<double>(v.density) * mean_share(v.octants); }
+
 /// Share of isotropic lines through a box around the unit cube that are stopped: the volume's by the geometry's.
 double coverage_ratio(const Surface& geometry, const SparseVolume& volume) {
   const test::MeshScene mesh(geometry);
@@ -106,7 +108,7 @@ TEST(MeasureVolume, OfRandomLeavesHasTheirDensity) {
   const Surface leaves = leaf_cloud(cloud);
   const SparseVolume volume = measured(leaves, 1.0 / 4);
   double area = 0;
-  for (const Voxel& v : volume.voxels) area += 2 * v.density * mean_opacity(v.sggx, 1e-9, 1) / 1e-9 / 64;
+  for (const Voxel& v : volume.voxels) area += 2 * mean_density(v) * mean_opacity(v.sggx, 1e-9, 1) / 1e-9 / 64;
   EXPECT_NEAR(area / test::total_area(leaves), 1, 0.02);
   EXPECT_NEAR(coverage_ratio(leaves, volume), 1, 0.01);
 }
@@ -158,7 +160,7 @@ TEST(MeasureVolume, LooksOnlyAsFarAsTheMacrosurface) {
       for (int v = 0; v < kBrickVoxels; ++v) {
         if (!(brick.mask[static_cast<size_t>(v >> 6)] >> (v & 63) & 1)) continue;
         const int x = brick.coordinate.x * kBrickSide + (v & 7);
-        (x >= 4 ? beside : inside)[i] += volume.voxels[index++].density;
+        (x >= 4 ? beside : inside)[i] += mean_density(volume.voxels[index++]);
       }
     }
   }
@@ -172,8 +174,8 @@ TEST(MeasureVolume, KeepsTheLocalMeasurementOfWhatNobodySees) {
   const SparseVolume hidden = measured(leaves, 1.0 / 4, shell);
   const SparseVolume local = *voxelize(leaves, {dvec3(0), 1.0 / 4}, {.rays_per_voxel = 100});  // the same rays
   double of_hidden = 0, of_local = 0;
-  for (const Voxel& v : hidden.voxels) of_hidden += v.density;
-  for (const Voxel& v : local.voxels) of_local += v.density;
+  for (const Voxel& v : hidden.voxels) of_hidden += mean_density(v);
+  for (const Voxel& v : local.voxels) of_local += mean_density(v);
   EXPECT_NEAR(of_hidden / of_local, 1, 0.01);  // thinned out
 }
 
@@ -208,6 +210,7 @@ TEST(MeasureVolume, IsTheSameForAnyNumberOfThreads) {
     ASSERT_EQ(results[i].voxels.size(), results[0].voxels.size());
     for (size_t v = 0; v < results[0].voxels.size(); ++v) {
       ASSERT_EQ(results[i].voxels[v].density, results[0].voxels[v].density);
+      ASSERT_EQ(results[i].voxels[v].octants, results[0].voxels[v].octants);
       ASSERT_EQ(results[i].voxels[v].sggx, results[0].voxels[v].sggx);
       ASSERT_EQ(results[i].voxels[v].diffuse, results[0].voxels[v].diffuse);
       ASSERT_EQ(results[i].voxels[v].self_shadowing, results[0].voxels[v].self_shadowing);

@@ -89,6 +89,36 @@ TEST(HotSpot, OfLeavesIsSeenAndGrowsWithTheirNumber) {
   EXPECT_LT(many, kStrongestHotSpot);
 }
 
+// Roofs of two leaves each, open below: what is seen from above loses less light than what is seen from below.
+TEST(OpenSide, OfFoldedLeavesIsTheSideThatBulges) {
+  const auto of_roofs = [](float drop) {
+    LeafCloud cloud;
+    cloud.count = 3000, cloud.leaf_size = 0.02f;
+    const Surface leaves = leaf_cloud(cloud);
+    Surface roofs;
+    for (size_t i = 0; i < leaves.positions.size(); i += 4) {
+      const vec3 p = leaves.positions[i];
+      const auto v = static_cast<uint32_t>(roofs.positions.size());
+      for (const float x : {-0.015f, 0.0f, 0.015f}) {
+        for (const float y : {-0.03f, 0.03f}) roofs.positions.push_back(p + vec3(x, y, x == 0 ? 0.0f : -drop));
+      }
+      for (const uvec3& t : {uvec3(0, 2, 3), uvec3(0, 3, 1), uvec3(2, 4, 5), uvec3(2, 5, 3)}) {
+        roofs.triangles.push_back(t + v);
+        FaceMaterial material;
+        material.diffuse = vec3(0.1f);
+        const vec3 a = roofs.positions[v + t.x], b = roofs.positions[v + t.y], c = roofs.positions[v + t.z];
+        material.sggx = SymMat3::outer(glm::normalize(glm::cross(b - a, c - a)));
+        roofs.materials.push_back(material);
+      }
+    }
+    return voxelized(roofs, 1.0 / 4).open_side;
+  };
+  const vec3 steep = of_roofs(0.02f), flat = of_roofs(0);
+  EXPECT_GT(steep.z, 0.1f);
+  EXPECT_LT(std::abs(steep.x) + std::abs(steep.y), 0.05f);
+  EXPECT_LT(glm::length(flat), 0.05f);
+}
+
 // The same leaves in tufts, each much smaller than a voxel: most of the light meets another leaf of the same tuft.
 TEST(SelfShadowing, OfTuftsIsStrong) {
   LeafCloud cloud;

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+
 #include <algorithm>
 #include <cstring>
 #include <limits>
@@ -441,6 +443,13 @@ TEST(Simplify, RandomSoupsAreNoProblem) {
     add_materials(soup);
     expect_valid(soup, simplify(soup, {.resolution = 2.0f * u(rng)}));
   }
+}
+
+TEST(Simplify, EndsOnceCancelled) {
+  const std::atomic<bool> cancel{true};
+  const Surface sphere = test::make_sphere(32, 16, 1.0f);
+  ASSERT_LT(simplify(sphere, {.resolution = 1.0f}).surface.triangles.size(), sphere.triangles.size());
+  EXPECT_EQ(simplify(sphere, {.resolution = 1.0f}, {{}, &cancel}).surface.triangles.size(), sphere.triangles.size());
 }
 
 }  // namespace

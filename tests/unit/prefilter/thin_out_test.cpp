@@ -44,6 +44,16 @@ TEST(ThinOut, KeepsTheSumOfFaintVoxelsUpToOneOfEachBrick) {
   }
 }
 
+// One octant of eight: a voxel whose density seems enough is not.
+TEST(ThinOut, CountsWhatOctantsLeaveEmpty) {
+  SparseVolume volume = filled(4, 0.05f);
+  for (Voxel& v : volume.voxels) v.octants = 0x0003;
+  const SparseVolume thin = thin_out(volume, 1);
+  EXPECT_LT(thin.voxels.size(), 0.4 * double(volume.voxels.size()));
+  for (const Voxel& v : thin.voxels) EXPECT_EQ(v.octants, 0x0003);
+  EXPECT_NEAR(total_density(thin), total_density(volume), 4 * 8 * 0.05);
+}
+
 TEST(ThinOut, LeavesVoxelsThatAreNotFaint) {
   const SparseVolume volume = filled(2, 0.5f);
   const SparseVolume thin = thin_out(volume, 1);

@@ -35,6 +35,24 @@ struct RandomVolume {
   }
 };
 
+TEST(VoxelGrid, FindsEachStoredVoxelAndNoOther) {
+  const RandomVolume volume(3);
+  const VoxelGrid grid(volume.volume);
+  for (int z = -20; z < 20; ++z) {
+    for (int y = -20; y < 20; ++y) {
+      for (int x = -20; x < 20; ++x) {
+        const auto stored = volume.number.find({x, y, z});
+        const auto found = grid.find({x, y, z});
+        ASSERT_EQ(found.has_value(), stored != volume.number.end());
+        if (found) {
+          ASSERT_EQ(*found, stored->second);
+        }
+      }
+    }
+  }
+  EXPECT_FALSE(VoxelGrid(SparseVolume{}).find(ivec3(0)));
+}
+
 using Visits = std::vector<std::pair<uint32_t, double>>;  ///< voxel, length in it
 
 Visits walk(const VoxelGrid& grid, const VoxelRay& ray) {

@@ -84,7 +84,7 @@ TEST_F(RuntimeTest, CreateRefusesImpossibleOptions) {
   for (const float scale :
        {0.0f, -1.0f, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
     RuntimeOptions options;
-    options.lod_scale = scale;
+    options.pixel_error = scale;
     EXPECT_TRUE(refuses(options));
   }
   EXPECT_TRUE(refuses(with_lambda(std::numeric_limits<float>::quiet_NaN())));
@@ -336,9 +336,9 @@ TEST_F(RuntimeTest, TheNearerTheCameraTheFinerThePlan) {
 }
 
 TEST_F(RuntimeTest, LodScaleAndInstanceScaleMoveTheLevel) {
-  const auto finest = [](float lod_scale, float instance_scale) {
+  const auto finest = [](float pixel_error, float instance_scale) {
     RuntimeOptions options;
-    options.lod_scale = lod_scale;
+    options.pixel_error = pixel_error;
     Host host(options);
     host.add(sphere(), {mat4x3(instance_scale)});
     return host.plan(vec3(0, 0, 1000), 0.1e-3f).finest_level[0];  // 0.1 wide: lambda 2.3 at scale 1
