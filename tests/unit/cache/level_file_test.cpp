@@ -297,8 +297,14 @@ TEST(HostileLevelFile, HeaderAndTableFieldsAreChecked) {
       {"reserved bytes", [](auto& h, auto*) { h.reserved[23] = 1; }},
       {"the hot spot's strength is -0.1", [](auto& h, auto*) { h.hot_spot = -0.1f; }},
       {"the hot spot's strength is 0.71", [](auto& h, auto*) { h.hot_spot = 0.71f; }},
-      {"the open side is (0, 0.6, 0)", [](auto& h, auto*) { h.open_side = {0, 0.6f, 0}; }},
-      {"the open side is (nan, 0, 0)", [](auto& h, auto*) { h.open_side = {NAN, 0, 0}; }},
+      {"the open side is (0, 0.6, 0)",
+       [](auto& h, auto*) {
+         h.open_side = {0, 0.6f, 0};
+       }},
+      {"the open side is (nan, 0, 0)",
+       [](auto& h, auto*) {
+         h.open_side = {NAN, 0, 0};
+       }},
       {"the hot spot's strength is nan", [](auto& h, auto*) { h.hot_spot = NAN; }},
       {"the resolution is 0", [](auto& h, auto*) { h.resolution = 0; }},
       {"the resolution is nan", [](auto& h, auto*) { h.resolution = NAN; }},
