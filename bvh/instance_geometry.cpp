@@ -191,7 +191,8 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
   HitRecord made;
   made.instance = instance;
   made.level_slot = static_cast<uint8_t>(visit.level->slot);
-  made.lambda = visit.choice.lambda;
+  const InstanceRecord& of = instances[instance];
+  made.lambda = lambda_of_choice(*assets[of.asset], of.footprint, visit.choice, forced_lambda);
   vec3 normal_world(0.0f);
   if (collision) {
     ray.tfar = collision->t;

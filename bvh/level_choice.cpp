@@ -2,6 +2,7 @@
 #include "bvh/level_choice.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "base/hash.h"
 #include "lodselect/footprint.h"
@@ -14,6 +15,26 @@ namespace {
 uint32_t usable_near(const TracedAsset& asset, uint32_t slot) {
   const auto found = std::ranges::lower_bound(asset.usable_slots, slot);
   return found != asset.usable_slots.end() ? *found : asset.usable_slots.back();
+}
+
+float footprint_in_r0(const TracedAsset& asset, const InstanceFootprint& footprint, float world) {
+  return world * footprint.world_to_r0 / asset.base_resolution;
+}
+
+/// 2^k, for the whole numbers that levels have.
+float width_of_level(float k) {
+  return std::bit_cast<float>(static_cast<uint32_t>(127 + static_cast<int>(std::min(k, 127.0f))) << 23);
+}
+
+/// The usable level that a footprint, in units of r_0, sees alone; none where it sees two.
+std::optional<uint32_t> only_slot(const TracedAsset& asset, float footprint) {
+  const std::vector<uint8_t>& usable = asset.usable_slots;
+  for (size_t i = 0; i + 1 < usable.size(); ++i) {
+    const float coarser = width_of_level(asset.level_numbers[usable[i + 1]]);
+    if (!(footprint > 0.5f * coarser)) return usable[i];  // also for NaN
+    if (footprint < coarser) return {};
+  }
+  return usable.back();
 }
 
 }  // namespace
@@ -31,17 +52,30 @@ SlotBlend split_slots(const TracedAsset& asset, float lambda) {
 LevelChoice choose_level(const TracedAsset& asset, const InstanceFootprint& footprint, uint32_t instance,
                          const RayContext& ray, float t_entry, const std::optional<float>& forced_lambda) {
   const RayCone cone{ray.cone_width, ray.cone_spread};
-  const float world = std::max(footprint.camera_footprint, cone.diameter(t_entry));
+  LevelChoice choice{0, std::max(footprint.camera_footprint, cone.diameter(t_entry))};
+  if (ray.origin_instance == instance) {
+    choice.slot = usable_near(asset, ray.origin_level_slot);
+    return choice;
+  }
+  if (!forced_lambda) {
+    if (const auto slot = only_slot(asset, footprint_in_r0(asset, footprint, choice.footprint))) {
+      choice.slot = *slot;
+      return choice;
+    }
+  }
+  const SlotBlend blend = split_slots(asset, lambda_of_choice(asset, footprint, choice, forced_lambda));
+  const float u = to_unit_float(mix64(ray.path_seed, instance));
+  choice.slot = u < blend.blend ? blend.coarser : blend.slot;
+  return choice;
+}
+
+float lambda_of_choice(const TracedAsset& asset, const InstanceFootprint& footprint, const LevelChoice& choice,
+                       const std::optional<float>& forced_lambda) {
   const float coarsest = asset.coarsest_number();
   const float asked = forced_lambda ? std::clamp(*forced_lambda, 0.0f, coarsest)
-                                    : lambda_of_footprint(world * footprint.world_to_r0, asset.base_resolution,
-                                                          static_cast<int>(coarsest));
-  const float lambda = std::max(asked, asset.level_numbers[asset.finest_slot()]);
-
-  if (ray.origin_instance == instance) return {usable_near(asset, ray.origin_level_slot), lambda, world};
-  const SlotBlend blend = split_slots(asset, lambda);
-  const float u = to_unit_float(mix64(ray.path_seed, instance));
-  return {u < blend.blend ? blend.coarser : blend.slot, lambda, world};
+                                    : lambda_of_footprint(choice.footprint * footprint.world_to_r0,
+                                                          asset.base_resolution, static_cast<int>(coarsest));
+  return std::max(asked, asset.level_numbers[asset.finest_slot()]);
 }
 
 }  // namespace farfield

@@ -29,8 +29,7 @@ SlotBlend split_slots(const TracedAsset& asset, float lambda);
 
 struct LevelChoice {
   uint32_t slot;    ///< stored level
-  float lambda;     ///< that was asked for, after the plan's clamp
-  float footprint;  ///< world units, at the instance's bounds
+  float footprint;  ///< world units: the wider of the camera's on the instance and the ray's cone where it enters
 };
 
 /// lambda is that of the wider of the camera's footprint on the instance and the ray's cone where it enters the
@@ -39,5 +38,9 @@ struct LevelChoice {
 /// same one. A ray that leaves a hit on this instance keeps that hit's level. forced_lambda replaces lambda.
 LevelChoice choose_level(const TracedAsset& asset, const InstanceFootprint& footprint, uint32_t instance,
                          const RayContext& ray, float t_entry, const std::optional<float>& forced_lambda);
+
+/// The lambda of a choice: what was asked for, after the plan's clamp. For hits alone: most choices need no logarithm.
+float lambda_of_choice(const TracedAsset& asset, const InstanceFootprint& footprint, const LevelChoice& choice,
+                       const std::optional<float>& forced_lambda);
 
 }  // namespace farfield

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace farfield {
 namespace {
 
@@ -20,6 +22,11 @@ RayContext path(uint32_t seed) {
   RayContext ray;
   ray.path_seed = seed;
   return ray;
+}
+
+float chosen_lambda(const TracedAsset& asset, const InstanceFootprint& footprint, const RayContext& ray,
+                    float t_entry) {
+  return lambda_of_choice(asset, footprint, choose_level(asset, footprint, 1, ray, t_entry, {}), {});
 }
 
 /// How often paths see each slot at a lambda.
@@ -114,7 +121,7 @@ TEST(LevelChoice, ThePlanClampsLambda) {
   for (const float lambda : {0.0f, 0.7f, 1.99f, 2.0f}) {
     const LevelChoice choice = choose_level(asset, {}, 1, path(1), 0.0f, lambda);
     EXPECT_EQ(choice.slot, 2u);
-    EXPECT_EQ(choice.lambda, 2.0f);
+    EXPECT_EQ(lambda_of_choice(asset, {}, choice, lambda), 2.0f);
   }
 }
 
@@ -122,15 +129,33 @@ TEST(LevelChoice, TakesTheWiderOfCameraAndCone) {
   const TracedAsset asset = asset_with({0, 1, 2, 3, 4, 5, 6, 7});
   const InstanceFootprint camera{0.04f, 1.0f};  // lambda 2
   RayContext ray = path(1);
-  EXPECT_NEAR(choose_level(asset, camera, 1, ray, 100.0f, std::nullopt).lambda, 2.0f, 1e-4f);
+  EXPECT_NEAR(chosen_lambda(asset, camera, ray, 100.0f), 2.0f, 1e-4f);
   ray.cone_spread = 0.0016f;  // 0.16 at t = 100: lambda 4
-  EXPECT_NEAR(choose_level(asset, camera, 1, ray, 100.0f, std::nullopt).lambda, 4.0f, 1e-4f);
-  EXPECT_NEAR(choose_level(asset, camera, 1, ray, 1.0f, std::nullopt).lambda, 2.0f, 1e-4f);
+  EXPECT_NEAR(chosen_lambda(asset, camera, ray, 100.0f), 4.0f, 1e-4f);
+  EXPECT_NEAR(chosen_lambda(asset, camera, ray, 1.0f), 2.0f, 1e-4f);
   ray.cone_width = 0.32f;
-  EXPECT_NEAR(choose_level(asset, camera, 1, ray, 0.0f, std::nullopt).lambda, 5.0f, 1e-4f);
+  EXPECT_NEAR(chosen_lambda(asset, camera, ray, 0.0f), 5.0f, 1e-4f);
   // An instance twice as large needs one level finer; pixel_error 4 makes it two levels coarser.
-  EXPECT_NEAR(choose_level(asset, {0.04f, 0.5f}, 1, path(1), 0.0f, std::nullopt).lambda, 1.0f, 1e-4f);
-  EXPECT_NEAR(choose_level(asset, {0.04f, 4.0f}, 1, path(1), 0.0f, std::nullopt).lambda, 4.0f, 1e-4f);
+  EXPECT_NEAR(chosen_lambda(asset, {0.04f, 0.5f}, path(1), 0.0f), 1.0f, 1e-4f);
+  EXPECT_NEAR(chosen_lambda(asset, {0.04f, 4.0f}, path(1), 0.0f), 4.0f, 1e-4f);
+}
+
+// What footprints see is what the lambda of theirs sees.
+TEST(LevelChoice, FootprintsAndLambdasChooseTheSame) {
+  TracedAsset asset = asset_with({0, 1, 2, 3, 5, 8});
+  for (const std::vector<uint8_t>& usable : {std::vector<uint8_t>{0, 1, 2, 3, 4, 5}, {1, 3, 5}, {2, 5}, {5}}) {
+    asset.usable_slots = usable;
+    for (int i = -20; i <= 200; ++i) {
+      const float footprint = asset.base_resolution * std::exp2(static_cast<float>(i) / 20);
+      const float lambda = std::clamp(static_cast<float>(i) / 20, 0.0f, 8.0f);
+      int different = 0;
+      for (uint32_t seed = 0; seed < 100; ++seed) {
+        different += choose_level(asset, {footprint, 1.0f}, 3, path(seed), 0.0f, {}).slot !=
+                     choose_level(asset, {footprint, 1.0f}, 3, path(seed), 0.0f, lambda).slot;
+      }
+      EXPECT_LE(different, 1) << lambda;  // exp2 rounds
+    }
+  }
 }
 
 TEST(LevelChoice, RaysThatLeaveAHitKeepItsLevelOnThatInstanceOnly) {
