@@ -5,11 +5,11 @@ leaf to the forest. Only the standard library; same file every time.
 
 Usage: scripts/make_demo_scene.py [OUT.glb]
 """
+import argparse
 import json
 import math
 import random
 import struct
-import sys
 from pathlib import Path
 
 
@@ -325,4 +325,7 @@ def build(path):
 
 
 if __name__ == "__main__":
-    build(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parent.parent / "samples/data/pullback.glb")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scene", nargs="?", type=Path,
+                        default=Path(__file__).parent.parent / "samples/data/pullback.glb")
+    build(parser.parse_args().scene)
