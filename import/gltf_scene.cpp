@@ -572,9 +572,17 @@ GltfCamera GltfScene::camera_at(size_t index, double seconds) const {
   return camera;
 }
 
+bool GltfScene::do_instances_move() const {
+  std::vector<bool> moves;
+  for (const GltfNode& node : nodes)
+    moves.push_back(!node.channels.empty() || (node.parent >= 0 && moves[static_cast<size_t>(node.parent)]));
+  return std::ranges::any_of(instances, [&](const GltfInstance& instance) { return moves[instance.node]; });
+}
+
 std::vector<GltfInstance> GltfScene::instances_at(double seconds) const {
   const std::vector<dmat4> world = world_matrices(*this, seconds);
   std::vector<GltfInstance> placed;
+  placed.reserve(instances.size());
   for (const GltfInstance& instance : instances) {
     const dmat4 to_world = world[instance.node] * to_square(instance.in_node);
     if (!is_invertible(to_world)) continue;

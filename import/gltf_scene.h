@@ -113,6 +113,8 @@ struct GltfScene {
 
   /// Camera `index` (< cameras.size()) at a time; times outside the animation's range hold its first or last key.
   GltfCamera camera_at(size_t index, double seconds) const;
+  /// Whether any instance is animated. If not, `instances` is what instances_at() gives for every time.
+  bool do_instances_move() const;
   /// All instances at a time. An instance whose transform is singular then is left out.
   std::vector<GltfInstance> instances_at(double seconds) const;
   /// Frame n shows the time n / frames_per_second; frame 0 is time 0, as Blender exports it.

@@ -98,6 +98,28 @@ bool same_places(std::span<const GltfInstance> a, std::span<const GltfInstance> 
   });
 }
 
+/// The instances of one frame after the other. Those of a scene where none moves are the scene's own: a copy of a
+/// million takes as much as many an asset.
+class PlacedInstances {
+ public:
+  explicit PlacedInstances(const GltfScene& scene) : scene_(scene), do_move_(scene.do_instances_move()) {}
+
+  std::span<const GltfInstance> get() const { return do_move_ ? std::span(placed_) : std::span(scene_.instances); }
+  /// True if some stand elsewhere than before.
+  bool move_to(double seconds) {
+    if (!do_move_) return false;
+    std::vector<GltfInstance> placed = scene_.instances_at(seconds);
+    const bool did_move = !same_places(placed, placed_);
+    placed_ = std::move(placed);
+    return did_move;
+  }
+
+ private:
+  const GltfScene& scene_;
+  bool do_move_;
+  std::vector<GltfInstance> placed_;
+};
+
 void report_problems(const RenderOptions& options, const FrameReport& frame) {
   if (options.warning && frame.invalid_samples > 0)
     options.warning(
@@ -160,16 +182,14 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
   const PeakMemory memory;
 
   std::unique_ptr<RenderSession> session;
-  std::vector<GltfInstance> session_instances;
+  PlacedInstances instances(scene_);
   for (size_t i = 0; i < frames.size(); ++i) {
     const double seconds = scene_.seconds_of_frame(frames[i]);
-    std::vector<GltfInstance> instances = scene_.instances_at(seconds);
-    if (!session || !same_places(instances, session_instances)) {
+    if (const bool did_move = instances.move_to(seconds); did_move || !session) {
       session.reset();  // before the next one, so that two never share the budget
       FARFIELD_TRY_LET(auto opened,
-                       RenderSession::open(device.get(), options_, asset_folders_, instances, material_names_));
+                       RenderSession::open(device.get(), options_, asset_folders_, instances.get(), material_names_));
       session = std::move(opened);
-      session_instances = std::move(instances);
     }
 
     const Camera camera = make_camera(scene_, camera_, seconds, options_.width, options_.height);
@@ -185,7 +205,7 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     report.peak_accounted_bytes = std::max(report.peak_accounted_bytes, session->stats().peak_accounted_bytes);
     report.peak_rss_bytes = memory.peak_bytes();
     report.warnings = warnings_->lines();
-    const Metadata metadata = frame_metadata(options_, scene_, camera, frames[i], session_instances, material_names_);
+    const Metadata metadata = frame_metadata(options_, scene_, camera, frames[i], instances.get(), material_names_);
     if (auto taken = sink(film.image(), metadata, report); !taken) return tl::unexpected(taken.error());
   }
   report.peak_rss_bytes = memory.peak_bytes();

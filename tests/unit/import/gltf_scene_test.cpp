@@ -213,6 +213,7 @@ TEST(GltfScene, LinearKeysInterpolateStraightAndRotationsTheShortWay) {
   EXPECT_LT(distance(scene->camera_at(0, 0.5).forward, vec3(-h, 0, -h)), 1e-6f);  // 45 degrees about y
   EXPECT_LT(distance(scene->camera_at(0, 2).forward, vec3(-1, 0, 0)), 1e-6f);
   EXPECT_LT(distance(scene->camera_at(0, std::nan("")).position, vec3(0, 0, 0)), 1e-6f);
+  EXPECT_TRUE(scene->do_instances_move());
   const auto moved = scene->instances_at(2.5);
   ASSERT_EQ(moved.size(), 1u);
   EXPECT_LT(distance(moved[0].to_world[3], vec3(4, 6, 0)), 1e-6f);
@@ -326,6 +327,7 @@ TEST(GltfScene, GpuInstancesAreInstancesWhetherUsedOrRequired) {
     ASSERT_TRUE(scene) << scene.error().message;
     ASSERT_EQ(scene->instances.size(), 100u);
     EXPECT_EQ(scene->instances_at(0).size(), 100u);
+    EXPECT_FALSE(scene->do_instances_move());
     EXPECT_NE(scene->instances[0].to_world[3], scene->instances[99].to_world[3]);
     EXPECT_EQ(scene->instances_at(0)[99].to_world, scene->instances[99].to_world);
 
