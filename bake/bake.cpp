@@ -202,13 +202,11 @@ uint64_t least_shell_bytes(const Surface& wall, double resolution) {
 void add_to_hull(const LevelView& level, SlabHull& hull) {
   for (const vec3& position : level.positions) hull.add(position);
   const float voxel_size = level.header.resolution;
-  for (size_t cell = 0; cell < level.brick_table.size(); ++cell) {
-    if (level.brick_table[cell] == kNoBrick) continue;
-    const Box3 voxels = active_box(level.bricks[level.brick_table[cell]]);
-    const ivec3 brick_at = brick_coordinates(level.header, cell);
-    const vec3 corner = level.header.volume_origin + vec3(brick_at * kBrickSide) * voxel_size;
+  for_each_brick(level, [&](const Brick& brick, const ivec3& coordinates) {
+    const Box3 voxels = active_box(brick);
+    const vec3 corner = level.header.volume_origin + vec3(coordinates * kBrickSide) * voxel_size;
     hull.add(Box3{corner + voxels.lower * voxel_size, corner + voxels.upper * voxel_size});
-  }
+  });
 }
 
 /// One bake, step by step.

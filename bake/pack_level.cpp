@@ -361,11 +361,7 @@ LevelData pack_volume(const SparseVolume& volume) {
   level.brick_table.assign(static_cast<size_t>(dims.x) * static_cast<size_t>(dims.y) * static_cast<size_t>(dims.z),
                            kNoBrick);
   for (const VoxelBrick& brick : volume.bricks) {  // in the order of the table
-    const ivec3 c = brick.coordinate - lower;
-    const size_t cell = static_cast<size_t>(c.x) +
-                        static_cast<size_t>(dims.x) *
-                            (static_cast<size_t>(c.y) + static_cast<size_t>(dims.y) * static_cast<size_t>(c.z));
-    level.brick_table[cell] = static_cast<uint32_t>(level.bricks.size());
+    level.brick_table[brick_table_index(dims, brick.coordinate - lower)] = static_cast<uint32_t>(level.bricks.size());
     level.bricks.push_back(pack_brick(volume, brick));
   }
   level.header.hot_spot = volume.hot_spot;

@@ -30,6 +30,8 @@ struct Box3 {
   /// Extent along each axis; zero for the empty box.
   vec3 size() const { return is_empty() ? vec3(0.0f) : upper - lower; }
   vec3 center() const { return 0.5f * (lower + upper); }
+  /// Corner i in [0, 8): bit a says whether it is the upper one along axis a.
+  vec3 corner(int i) const { return {i & 1 ? upper.x : lower.x, i & 2 ? upper.y : lower.y, i & 4 ? upper.z : lower.z}; }
   void extend(const vec3& point) {
     lower = glm::min(lower, point);
     upper = glm::max(upper, point);

@@ -35,8 +35,6 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // Six-byte matrices have eigenvalues up to 1 + 1/127 (docs/theory.md, section 10.10), so sigma may reach its square
 // root.
 constexpr float kSigmaBound = 1.00393f;
-// Bricks are skimmed up to this many expected tentative collisions, each of which costs as much as a few voxels.
-constexpr float kMostSkimmed = 2.0f;
 
 /// Random numbers of one flight.
 class FlightRandom {
@@ -53,12 +51,6 @@ int clamped_cell(float coordinate, int count) {
   // The negated comparison also sends NaN to 0; the conversion is in range after it.
   if (!(coordinate > 0.0f)) return 0;
   return coordinate < static_cast<float>(count) ? static_cast<int>(coordinate) : count - 1;
-}
-
-size_t table_index(const ivec3& cell, const ivec3& dims) {
-  return static_cast<size_t>(cell.x) +
-         static_cast<size_t>(dims.x) *
-             (static_cast<size_t>(cell.y) + static_cast<size_t>(dims.y) * static_cast<size_t>(cell.z));
 }
 
 /// The walk over the cells of one grid level: which cell, and where the ray crosses into the next along each axis.
@@ -122,15 +114,13 @@ BrickVolume::BrickVolume(const LevelView& level)
 }
 
 void BrickVolume::find_what_is_occupied(const LevelView& level) {
-  for (size_t i = 0; i < brick_table_.size(); ++i) {
-    if (brick_table_[i] == kNoBrick) continue;
-    const Brick& brick = bricks_[brick_table_[i]];
+  for_each_brick(level, [&](const Brick& brick, const ivec3& coordinates) {
     const Box3 voxels = active_box(brick);
-    if (voxels.is_empty()) continue;
-    const vec3 corner(brick_coordinates(level.header, i) * kBrickSide);
+    if (voxels.is_empty()) return;
+    const vec3 corner(coordinates * kBrickSide);
     occupied_.extend(Box3{corner + voxels.lower, corner + voxels.upper});
     densest_scale_ = std::max(densest_scale_, brick.density_scale);
-  }
+  });
   if (!(densest_scale_ > 0)) bricks_ = {};  // nothing that a ray could meet
 }
 
@@ -257,7 +247,7 @@ std::optional<VolumeHit> BrickVolume::first_collision(const LocalRay& ray, uint6
             brick_dims_);
   for (float s = 0.0f;;) {
     const float s_exit = walk.exit(), s_next = std::min(s_exit, s_end);
-    const uint32_t index = brick_table_[table_index(walk.cell, brick_dims_)];
+    const uint32_t index = brick_table_[brick_table_index(brick_dims_, walk.cell)];
     if (index != kNoBrick && s_next > s) {
       const Brick& brick = bricks_[index];
       // By the whole chord, so that where the ray ends changes nothing before.

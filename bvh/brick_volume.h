@@ -11,6 +11,9 @@
 
 namespace farfield {
 
+/// Bricks are skimmed up to this many expected tentative collisions, each of which costs as much as a few voxels.
+inline constexpr float kMostSkimmed = 2.0f;
+
 /// A collision with a flake.
 struct VolumeHit {
   float t;           ///< ray parameter

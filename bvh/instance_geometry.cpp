@@ -132,11 +132,7 @@ Box3 instance_bounds(const InstanceRecord& instance, const TracedAsset& asset) {
   Box3 bounds;
   const auto extend = [&](const vec3& p) { bounds.extend(vec3(to_world * (glm::dvec3(p) - back))); };
   if (asset.hull.empty()) {
-    for (int corner = 0; corner < 8; ++corner) {
-      extend({(corner & 1) ? asset.bounds.upper.x : asset.bounds.lower.x,
-              (corner & 2) ? asset.bounds.upper.y : asset.bounds.lower.y,
-              (corner & 4) ? asset.bounds.upper.z : asset.bounds.lower.z});
-    }
+    for (int i = 0; i < 8; ++i) extend(asset.bounds.corner(i));
   }
   for (const vec3& p : asset.hull) extend(p);
   const float far = std::max(max_component(glm::abs(bounds.lower)), max_component(glm::abs(bounds.upper)));
@@ -191,8 +187,8 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
   HitRecord made;
   made.instance = instance;
   made.level_slot = static_cast<uint8_t>(visit.level->slot);
-  const InstanceRecord& of = instances[instance];
-  made.lambda = lambda_of_choice(*assets[of.asset], of.footprint, visit.choice, forced_lambda);
+  const InstanceRecord& hit_instance = instances[instance];
+  made.lambda = lambda_of_choice(*assets[hit_instance.asset], hit_instance.footprint, visit.choice, forced_lambda);
   vec3 normal_world(0.0f);
   if (collision) {
     ray.tfar = collision->t;
@@ -206,7 +202,7 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
     const vec2 barycentric = face_barycentric(hit.u, hit.v);
     made.barycentric[0] = barycentric.x, made.barycentric[1] = barycentric.y;
     made.normal_local[0] = normal.x, made.normal_local[1] = normal.y, made.normal_local[2] = normal.z;
-    normal_world = instances[instance].normal_to_world(normal);
+    normal_world = hit_instance.normal_to_world(normal);
   }
   made.footprint = context.cone_width + context.cone_spread * ray.tfar;
   hit.Ng_x = normal_world.x, hit.Ng_y = normal_world.y, hit.Ng_z = normal_world.z;

@@ -26,8 +26,6 @@ constexpr double kRay = 55, kBox = 6, kQuad = 1, kBrick = 21, kVoxel = 12.5, kCo
 
 // What a flake shows on average over directions of its full area: one side of a flat one.
 constexpr float kMeanArea = 0.5f;
-// As BrickVolume: bricks with fewer expected tentative collisions are not walked voxel by voxel.
-constexpr float kFaint = 2.0f;
 
 // ---- surface ----
 
@@ -226,15 +224,13 @@ float mean_share_of(const LevelView& level, const Brick& brick, int voxel) {
 class Volume {
  public:
   explicit Volume(const LevelView& level) : level_(level) {
-    for (size_t i = 0; i < level.brick_table.size(); ++i) {
-      if (level.brick_table[i] == kNoBrick) continue;
-      const Brick& brick = level.bricks[level.brick_table[i]];
+    for_each_brick(level, [&](const Brick& brick, const ivec3& coordinates) {
       const Box3 voxels = active_box(brick);
-      const vec3 corner = level.header.volume_origin + brick_side() * vec3(brick_coordinates(level.header, i));
+      const vec3 corner = level.header.volume_origin + brick_side() * vec3(coordinates);
       occupied_.extend(
           Box3{corner + level.header.resolution * voxels.lower, corner + level.header.resolution * voxels.upper});
       densest_scale_ = std::max(densest_scale_, brick.density_scale);
-    }
+    });
   }
   const LevelView& level() const { return level_; }
   float brick_side() const { return level_.header.resolution * kBrickSide; }
@@ -271,14 +267,12 @@ class FreeFlight {
   /// A cell of the brick table. False: the flight ends there.
   bool cross_cell(const ivec3& cell, float enter, float leave) {
     const LevelView& level = volume_.level();
-    const ivec3& dims = level.header.brick_dims;
     work_.bricks += 1;
-    const size_t row = static_cast<size_t>(cell.y) + static_cast<size_t>(dims.y) * static_cast<size_t>(cell.z);
-    const uint32_t index = level.brick_table[static_cast<size_t>(cell.x) + static_cast<size_t>(dims.x) * row];
+    const uint32_t index = level.brick_table[brick_table_index(level.header.brick_dims, cell)];
     if (index == kNoBrick) return true;
     const Brick& brick = level.bricks[index];
     const float expected = brick.density_scale * (leave - enter);
-    const bool is_faint = expected <= kFaint;
+    const bool is_faint = expected <= kMostSkimmed;
     if (is_faint) work_.collisions += static_cast<double>(expected);
     const vec3 corner = level.header.volume_origin + volume_.brick_side() * vec3(cell);
     return walk_cells(origin_, direction_, {corner, corner + volume_.brick_side()}, ivec3(kBrickSide),

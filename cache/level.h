@@ -119,6 +119,13 @@ inline ivec3 brick_coordinates(const LevelHeader& header, uint64_t table_index) 
           static_cast<int>(table_index / (x * y))};
 }
 
+/// The entry of the brick table for a brick's coordinates, in a table of these dimensions.
+inline size_t brick_table_index(const ivec3& dims, const ivec3& brick) {
+  return static_cast<size_t>(brick.x) +
+         static_cast<size_t>(dims.x) *
+             (static_cast<size_t>(brick.y) + static_cast<size_t>(dims.y) * static_cast<size_t>(brick.z));
+}
+
 /// Every array of a level, once, in the order in which they lie in the file: ARRAY(id in files, Name, field, element,
 /// group). Ids never change their meaning. The first two arrays are read by BVH builds, and where faces have texture
 /// coordinates at hits; morph maps only by morphs: parts of the file that can be given back. Arrays of one group have
@@ -179,6 +186,16 @@ template <typename T>
 using OwnedArray = std::vector<T>;
 template <typename T>
 using ArrayView = std::span<const T>;
+
+/// Calls visit(brick, its coordinates in bricks) for the bricks of a level (LevelData or LevelView), in their order.
+template <typename Level, typename Visit>
+void for_each_brick(const Level& level, Visit&& visit) {
+  for (size_t i = 0; i < level.brick_table.size(); ++i) {
+    if (level.brick_table[i] != kNoBrick) {
+      visit(level.bricks[level.brick_table[i]], brick_coordinates(level.header, i));
+    }
+  }
+}
 
 /// Number of faces of a level's surface.
 template <template <typename> class Array>

@@ -24,8 +24,8 @@ enum class LevelCheck;  // cache/level_file.h
 
 static_assert(std::endian::native == std::endian::little, "level files are little-endian and are used in place");
 
-inline constexpr uint32_t kLevelFileVersion =
-    4;  ///< 1 had arrays 1 to 18 alone, 2 those to 27 and no hot spot, 3 those to 28 and no open side
+/// 1 had arrays 1 to 18 alone, 2 those to 27 and no hot spot, 3 those to 28 and no open side.
+inline constexpr uint32_t kLevelFileVersion = 4;
 /// Not text (first byte), and a copy in text mode breaks it (line ends), as in PNG.
 inline constexpr std::array<uint8_t, 8> kLevelFileMagic = {0x89, 'F', 'F', 'L', 'V', '\r', '\n', 0x1a};
 inline constexpr uint64_t kSectionAlignment = 64;  ///< a cache line; Brick needs it

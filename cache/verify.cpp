@@ -151,16 +151,14 @@ class Verifier {
 
   static std::vector<vec3> voxel_centers(const LevelView& level) {
     std::vector<vec3> centers;
-    for (size_t cell = 0; cell < level.brick_table.size(); ++cell) {
-      if (level.brick_table[cell] == kNoBrick) continue;
-      const ivec3 corner = brick_coordinates(level.header, cell) * kBrickSide;
-      const Brick& brick = level.bricks[level.brick_table[cell]];
+    for_each_brick(level, [&](const Brick& brick, const ivec3& coordinates) {
+      const ivec3 corner = coordinates * kBrickSide;
       for (int i = 0; i < kBrickVoxels; ++i) {
         if (brick.density[static_cast<size_t>(i)] == 0) continue;
         const ivec3 voxel = corner + ivec3(i % 8, i / 8 % 8, i / 64);
         centers.push_back(level.header.volume_origin + (vec3(voxel) + 0.5f) * level.header.resolution);
       }
-    }
+    });
     return centers;
   }
 

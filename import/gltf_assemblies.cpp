@@ -269,11 +269,7 @@ class AssemblyFinder {
       const dmat4 to_assembly = to_root * place;
       if (!is_invertible(to_assembly)) continue;
       Box3& box = boxes.emplace_back();
-      for (int corner = 0; corner < 8; ++corner) {
-        const vec3 point((corner & 1 ? bounds.upper : bounds.lower).x, (corner & 2 ? bounds.upper : bounds.lower).y,
-                         (corner & 4 ? bounds.upper : bounds.lower).z);
-        box.extend(vec3(to_assembly * glm::dvec4(point, 1)));
-      }
+      for (int i = 0; i < 8; ++i) box.extend(vec3(to_assembly * glm::dvec4(bounds.corner(i), 1)));
     }
     return boxes;
   }

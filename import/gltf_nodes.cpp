@@ -66,15 +66,6 @@ Result<void> set_tints(const GltfDocument& document, const tinygltf::Node& node,
   return {};
 }
 
-/// Of all instances of the node.
-InstanceData data_of_extras(const tinygltf::Node& node) {
-  InstanceData data;
-  const double id = extension_number(node.extras, "farfield_id").value_or(0);
-  if (id >= 0 && id <= kLargestId) data.id = static_cast<uint64_t>(id);
-  data.tint = extension_vec3(node.extras, "farfield_tint").value_or(data.tint);
-  return data;
-}
-
 /// Zero and NaN quaternions become the identity.
 glm::dvec4 unit_quaternion(const glm::dvec4& q) {
   const double length = glm::length(q);
@@ -205,6 +196,14 @@ Result<std::vector<glm::dmat4>> instance_transforms(const GltfDocument& document
     transforms.push_back(to_matrix(transform));
   }
   return transforms;
+}
+
+InstanceData data_of_extras(const tinygltf::Node& node) {
+  InstanceData data;
+  const double id = extension_number(node.extras, "farfield_id").value_or(0);
+  if (id >= 0 && id <= kLargestId) data.id = static_cast<uint64_t>(id);
+  data.tint = extension_vec3(node.extras, "farfield_tint").value_or(data.tint);
+  return data;
 }
 
 Result<std::vector<InstanceData>> instance_data(const GltfDocument& document, const tinygltf::Node& node,

@@ -40,6 +40,9 @@ Result<std::vector<glm::dmat4>> instance_transforms(const GltfDocument& document
 /// BadFile (no such accessor, another length, ids that are no whole numbers from 0, tints that are not finite).
 Result<std::vector<InstanceData>> instance_data(const GltfDocument& document, const tinygltf::Node& node, size_t count);
 
+/// What a node's extras say of all its instances, "farfield_id" and "farfield_tint", or the default.
+InstanceData data_of_extras(const tinygltf::Node& node);
+
 /// For each node whether KHR_node_visibility hides it, itself or by a node above it.
 std::vector<bool> hidden_nodes(const GltfDocument& document);
 

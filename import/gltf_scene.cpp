@@ -378,7 +378,7 @@ class SceneReader {
       const auto number = static_cast<size_t>(order[i]);
       const auto& node = model_.nodes[number];
       if (assemblies_.kind_of[number] >= 0)
-        FARFIELD_TRY(add_assembly(order[i], i, world));
+        add_assembly(order[i], i, world);
       else if (node.mesh >= 0 && !hidden[number] && !assemblies_.is_part[number])
         FARFIELD_TRY(add_instances(node, order[i], i, world));
     }
@@ -393,11 +393,10 @@ class SceneReader {
     return {};
   }
 
-  Result<void> add_assembly(int number, uint32_t index, const std::vector<dmat4>& worlds) {
+  void add_assembly(int number, uint32_t index, const std::vector<dmat4>& worlds) {
     const auto kind = static_cast<size_t>(assemblies_.kind_of[static_cast<size_t>(number)]);
-    FARFIELD_TRY_LET(const auto data, data_of_node(number));
+    const InstanceData data = data_of_extras(model_.nodes[static_cast<size_t>(number)]);
     show(number, static_cast<uint32_t>(model_.meshes.size() + kind), index, worlds, {dmat4(1.0)}, {data});
-    return {};
   }
 
   Result<void> add_instances(const tinygltf::Node& node, int number, uint32_t index, const std::vector<dmat4>& worlds) {
@@ -407,14 +406,6 @@ class SceneReader {
     if (has_weights_of_its_own(document_, node)) warn(fmt::format("node {} ({}): {}", number, node.name, kOwnWeights));
     show(number, first_equal_mesh_[static_cast<size_t>(node.mesh)], index, worlds, transforms, data);
     return {};
-  }
-
-  /// Of a node that is one instance, whatever its own mesh is.
-  Result<InstanceData> data_of_node(int number) {
-    tinygltf::Node alone;
-    alone.extras = model_.nodes[static_cast<size_t>(number)].extras;
-    FARFIELD_TRY_LET(const auto data, instance_data(document_, alone, 1));
-    return data[0];
   }
 
   /// Instances of an asset at a node: once for each transform, with the data of the same number.
@@ -597,11 +588,7 @@ Box3 GltfScene::bounds_world() const {
   for (const GltfInstance& instance : instances) {
     const Box3& local = meshes[instance.mesh].bounds;
     if (local.is_empty()) continue;
-    for (int corner = 0; corner < 8; ++corner) {
-      const vec3 p((corner & 1 ? local.upper : local.lower).x, (corner & 2 ? local.upper : local.lower).y,
-                   (corner & 4 ? local.upper : local.lower).z);
-      box.extend(instance.to_world * vec4(p, 1));
-    }
+    for (int i = 0; i < 8; ++i) box.extend(instance.to_world * vec4(local.corner(i), 1));
   }
   return box;
 }

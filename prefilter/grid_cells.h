@@ -21,14 +21,20 @@ inline ivec3 cell_of_key(uint64_t key) {
   return {part(0), part(21), part(42)};
 }
 
+/// Calls visit(cell) for the cells from `lower` to `upper`, both included, x fastest.
+template <typename Visit>
+void for_each_cell(const ivec3& lower, const ivec3& upper, Visit&& visit) {
+  for (int z = lower.z; z <= upper.z; ++z) {
+    for (int y = lower.y; y <= upper.y; ++y) {
+      for (int x = lower.x; x <= upper.x; ++x) visit(ivec3(x, y, z));
+    }
+  }
+}
+
 /// Calls visit(cell) for the (2 reach + 1)^3 cells around one.
 template <typename Visit>
 void for_each_cell_around(const ivec3& cell, int reach, Visit&& visit) {
-  for (int z = -reach; z <= reach; ++z) {
-    for (int y = -reach; y <= reach; ++y) {
-      for (int x = -reach; x <= reach; ++x) visit(cell + ivec3(x, y, z));
-    }
-  }
+  for_each_cell(cell - reach, cell + reach, visit);
 }
 
 }  // namespace farfield

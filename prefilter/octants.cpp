@@ -10,6 +10,7 @@
 #include "base/hash.h"
 #include "base/parallel.h"
 #include "prefilter/density.h"
+#include "prefilter/grid_cells.h"
 #include "prefilter/match_lines.h"
 #include "prefilter/triangle_pieces.h"
 
@@ -45,15 +46,10 @@ std::vector<uint8_t> touched_octants(const LineScene& scene, size_t voxels) {
     for (size_t i = begin; i < end; ++i) {
       const auto in_octants = in_cells(corners_of(geometry, i), scene.lattice().origin, scene.lattice().voxel_size / 2);
       for_each_piece(in_octants, 1, [&](const TrianglePiece& t) {
-        const ivec3 lower(glm::floor(glm::min(t[0], glm::min(t[1], t[2]))));
-        const ivec3 upper(glm::floor(glm::max(t[0], glm::max(t[1], t[2]))));
-        for (int z = lower.z; z <= upper.z; ++z) {
-          for (int y = lower.y; y <= upper.y; ++y) {
-            for (int x = lower.x; x <= upper.x; ++x) {
-              if (meets_plane(t, {x, y, z})) touch({x, y, z});
-            }
-          }
-        }
+        const CellRange octants = cells_of(t);
+        for_each_cell(octants.first, octants.last, [&](const ivec3& octant) {
+          if (meets_plane(t, octant)) touch(octant);
+        });
       });
     }
   });

@@ -73,6 +73,15 @@ inline TrianglePiece in_cells(const TrianglePiece& t, const dvec3& origin, doubl
   return {(t[0] - origin) / side, (t[1] - origin) / side, (t[2] - origin) / side};
 }
 
+/// The cells that the box of a triangle reaches, which is in cells: the first and the last.
+struct CellRange {
+  ivec3 first, last;
+};
+inline CellRange cells_of(const TrianglePiece& t) {
+  return {ivec3(glm::floor(glm::min(t[0], glm::min(t[1], t[2])))),
+          ivec3(glm::floor(glm::max(t[0], glm::max(t[1], t[2]))))};
+}
+
 inline dvec3 middle_of(const TrianglePiece& t) { return (t[0] + t[1] + t[2]) / 3.0; }
 /// Twice the area, along the normal.
 inline dvec3 area_vector_of(const TrianglePiece& t) { return glm::cross(t[1] - t[0], t[2] - t[0]); }

@@ -18,15 +18,10 @@ class BrickMarks {
  public:
   /// Marks all voxels of a box, upper corner included. Most are within one brick, and in that of the box before.
   void mark(const ivec3& lower, const ivec3& upper) {
-    const ivec3 first = lower >> 3, last = upper >> 3;
-    for (int z = first.z; z <= last.z; ++z) {
-      for (int y = first.y; y <= last.y; ++y) {
-        for (int x = first.x; x <= last.x; ++x) {
-          const ivec3 brick(x, y, z), corner = brick * kBrickSide;
-          mark_in_brick(mask_of(brick), glm::max(lower - corner, 0), glm::min(upper - corner, kBrickSide - 1));
-        }
-      }
-    }
+    for_each_cell(lower >> 3, upper >> 3, [&](const ivec3& brick) {
+      const ivec3 corner = brick * kBrickSide;
+      mark_in_brick(mask_of(brick), glm::max(lower - corner, 0), glm::min(upper - corner, kBrickSide - 1));
+    });
   }
 
   const std::unordered_map<uint64_t, VoxelMask>& masks() const { return masks_; }
@@ -52,8 +47,8 @@ class BrickMarks {
 
 /// Marks the voxels in the box of a piece of a triangle that is about as small as a voxel; in voxel units.
 void mark_piece(const TrianglePiece& t, BrickMarks& marks) {
-  const auto& [a, b, c] = t;
-  marks.mark(ivec3(glm::floor(glm::min(a, glm::min(b, c)))), ivec3(glm::floor(glm::max(a, glm::max(b, c)))));
+  const CellRange voxels = cells_of(t);
+  marks.mark(voxels.first, voxels.last);
 }
 
 /// What was marked, in the order of a VoxelSet.

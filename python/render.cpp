@@ -65,13 +65,9 @@ Environment to_environment(const py::object& light) {
 }
 
 Box3 bounds_in_world(const Runtime& runtime, AssetId asset, const mat4x3& to_world) {
-  vec3 lower, upper;
-  runtime.bounds(asset, lower, upper);
-  Box3 box;
-  for (int corner = 0; corner < 8; ++corner) {
-    const vec3 at(corner & 1 ? upper.x : lower.x, corner & 2 ? upper.y : lower.y, corner & 4 ? upper.z : lower.z);
-    box.extend(to_world * vec4(at, 1.0f));
-  }
+  Box3 local, box;
+  runtime.bounds(asset, local.lower, local.upper);
+  for (int i = 0; i < 8; ++i) box.extend(to_world * vec4(local.corner(i), 1.0f));
   return box;
 }
 

@@ -50,8 +50,8 @@ struct ScaledInverse {
 };
 
 /// S in world space, trace 1.
-SymMat3 to_world(const SymMat3& s, const InstanceRecord& instance) {
-  const SymMat3 world = congruence(glm::transpose(ScaledInverse(instance).matrix), s);
+SymMat3 to_world(const SymMat3& s, const ScaledInverse& inverse) {
+  const SymMat3 world = congruence(glm::transpose(inverse.matrix), s);
   const float trace = world.trace();
   return trace > 0.0f ? world * (1.0f / trace) : world;
 }
@@ -105,20 +105,21 @@ vec3 visible_normal(vec3 normal, const vec3& geometric_normal, const vec3& wo) {
 }
 
 /// Turned with the flakes, and as long as it was.
-vec3 open_side_to_world(const vec3& open_side, const InstanceRecord& instance) {
-  return glm::length(open_side) * glm::normalize(glm::transpose(ScaledInverse(instance).matrix) * open_side);
+vec3 open_side_to_world(const vec3& open_side, const ScaledInverse& inverse) {
+  return glm::length(open_side) * glm::normalize(glm::transpose(inverse.matrix) * open_side);
 }
 
 FlakeParams flake_params(const LevelView& level, const InstanceRecord& instance, uint32_t voxel) {
+  const ScaledInverse inverse(instance);
   FlakeParams params;
-  params.sggx = to_world(level.voxel_sggx.empty() ? SymMat3::identity() : unpack(level.voxel_sggx[voxel]), instance);
+  params.sggx = to_world(level.voxel_sggx.empty() ? SymMat3::identity() : unpack(level.voxel_sggx[voxel]), inverse);
   params.diffuse = color_at(level.voxel_diffuse, voxel);
   params.specular = color_at(level.voxel_specular, voxel);
   params.transmission = color_at(level.voxel_transmission, voxel);
   params.roughness2 = unorm_at(level.voxel_roughness2, voxel);
   params.self_shadowing = unorm_at(level.voxel_self_shadowing, voxel);
   params.hot_spot = level.header.hot_spot;
-  if (level.header.open_side != vec3(0.0f)) params.open_side = open_side_to_world(level.header.open_side, instance);
+  if (level.header.open_side != vec3(0.0f)) params.open_side = open_side_to_world(level.header.open_side, inverse);
   return params;
 }
 
@@ -182,7 +183,7 @@ SurfaceParams shade_surface(const TracedLevel& level, const InstanceRecord& inst
     const vec2 barycentric(hit.barycentric[0], hit.barycentric[1]);
     normal = look_closely(level, {quad, face, barycentric, local, width}, instance, normal, interaction, params);
   } else if (!view.face_sggx.empty()) {
-    const MainNormal main = main_normal(to_world(unpack(view.face_sggx[face]), instance), normal);
+    const MainNormal main = main_normal(to_world(unpack(view.face_sggx[face]), ScaledInverse(instance)), normal);
     normal = main.normal;
     params.roughness2 = std::min(params.roughness2 + main.roughness2, 1.0f);
   }

@@ -206,22 +206,22 @@ def tapering(t):
     return 1.1 - 0.5 * t
 
 
-def broadleaf(orders, bark, per_twig, size, widths, materials, **more):
+def tree(orders, bark, clothe, *how, **more):
+    """clothe: what puts leaves or needles on twigs."""
     def make(rng, scale):
         mesh = Mesh()
         twigs = skeleton(mesh, rng, orders, scale, bark)
-        leafy(mesh, rng, twigs, per_twig, size, widths, materials, **more)
+        clothe(mesh, rng, twigs, *how, **more)
         return mesh
     return make
+
+
+def broadleaf(orders, bark, per_twig, size, widths, materials, **more):
+    return tree(orders, bark, leafy, per_twig, size, widths, materials, **more)
 
 
 def needle_tree(orders, bark, per_twig, length, radius, material, **more):
-    def make(rng, scale):
-        mesh = Mesh()
-        twigs = skeleton(mesh, rng, orders, scale, bark)
-        needled(mesh, rng, twigs, per_twig, length, radius, material, **more)
-        return mesh
-    return make
+    return tree(orders, bark, needled, per_twig, length, radius, material, **more)
 
 
 OAK = [order(9, 0.42, 9, 16, 0.08, 0.05), order(6, 0.17, 8, 10, 0.14, 0.05, 22, 0.25, 1.0, round_crown),
