@@ -366,6 +366,7 @@ LevelData pack_volume(const SparseVolume& volume) {
   }
   level.header.hot_spot = volume.hot_spot;
   level.header.open_side = volume.open_side;
+  level.header.highlight_lean = volume.highlight_lean;
   const auto& voxels = volume.voxels;
   level.voxel_sggx = pack_each<PackedFlakeSggx>(voxels, [](const auto& v) { return pack_flake_sggx(v.sggx); });
   level.voxel_diffuse = pack_colors(voxels, [](const auto& v) { return v.diffuse; });

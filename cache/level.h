@@ -108,6 +108,7 @@ struct LevelHeader {
   ivec3 brick_dims{0};       ///< bricks along x, y, z; 0 without volume
   vec3 volume_origin{0.0f};  ///< lower corner of brick (0,0,0); voxel size is `resolution`
   float hot_spot = 0;        ///< of the volume's flakes, in [0, kStrongestHotSpot] (scattering/hot_spot.h)
+  float highlight_lean = 0;  ///< of the same, at most kMostHighlightLean (scattering/highlight_lean.h)
   vec3 open_side{0.0f};      ///< of the same, at most kMostOpenSide long (scattering/open_side.h)
 };
 

@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "cache/level_format.h"
+#include "scattering/highlight_lean.h"
 #include "scattering/hot_spot.h"
 #include "scattering/open_side.h"
 
@@ -34,6 +35,8 @@ Problem check_header(const LevelView& level) {
     return fmt::format("the hot spot's strength is {}", header.hot_spot);
   if (!(glm::length(header.open_side) <= kMostOpenSide * 1.001f))
     return fmt::format("the open side is ({}, {}, {})", header.open_side.x, header.open_side.y, header.open_side.z);
+  if (!(std::abs(header.highlight_lean) <= kMostHighlightLean))
+    return fmt::format("the highlight leans by {}", header.highlight_lean);
   if (!level.has_surface() && !level.has_volume()) return "it has neither surface nor volume";
   return {};
 }

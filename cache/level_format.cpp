@@ -38,9 +38,10 @@ vec3 to_vec3(const std::array<float, 3>& stored) { return {stored[0], stored[1],
 
 /// The first version that has what a level needs, so that older readers read what they can.
 uint32_t version_of(const LevelHeader& level, std::span<const SectionEntry> table) {
-  constexpr uint32_t kLastOfVersion1 = 18, kLastOfVersion2 = 27, kLastOfVersion3 = 28;
+  constexpr uint32_t kLastOfVersion1 = 18, kLastOfVersion2 = 27, kLastOfVersion3 = 28, kLastOfVersion4 = 29;
   const uint32_t last_section = table.empty() ? 0 : table.back().id;
-  if (level.open_side != vec3(0.0f) || last_section > kLastOfVersion3) return kLevelFileVersion;
+  if (level.highlight_lean != 0 || last_section > kLastOfVersion4) return kLevelFileVersion;
+  if (level.open_side != vec3(0.0f) || last_section > kLastOfVersion3) return 4;
   if (level.hot_spot != 0 || last_section > kLastOfVersion2) return 3;
   return last_section <= kLastOfVersion1 ? 1 : 2;
 }
@@ -55,6 +56,7 @@ LevelHeader to_level_header(const FileHeader& header) {
   level.volume_origin = to_vec3(header.volume_origin);
   level.hot_spot = header.hot_spot;
   level.open_side = to_vec3(header.open_side);
+  level.highlight_lean = header.highlight_lean;
   return level;
 }
 
@@ -249,6 +251,7 @@ std::vector<std::byte> encode_head(const LevelView& level, const LevelLayout& la
   copy_to(header.volume_origin, level.header.volume_origin);
   header.hot_spot = level.header.hot_spot;
   copy_to(header.open_side, level.header.open_side);
+  header.highlight_lean = level.header.highlight_lean;
   header.head_hash = hash_head(header, std::as_bytes(std::span(table)));
 
   std::vector<std::byte> head(head_bytes(table.size()));

@@ -25,7 +25,7 @@ enum class LevelCheck;  // cache/level_file.h
 static_assert(std::endian::native == std::endian::little, "level files are little-endian and are used in place");
 
 /// 1 had arrays 1 to 18 alone, 2 those to 27 and no hot spot, 3 those to 28 and no open side.
-inline constexpr uint32_t kLevelFileVersion = 4;
+inline constexpr uint32_t kLevelFileVersion = 5;
 /// Not text (first byte), and a copy in text mode breaks it (line ends), as in PNG.
 inline constexpr std::array<uint8_t, 8> kLevelFileMagic = {0x89, 'F', 'F', 'L', 'V', '\r', '\n', 0x1a};
 inline constexpr uint64_t kSectionAlignment = 64;  ///< a cache line; Brick needs it
@@ -87,9 +87,10 @@ struct FileHeader {
   std::array<float, 3> volume_origin;
   float hot_spot;
   std::array<float, 3> open_side;
-  std::array<uint8_t, 24> reserved;  ///< 0
+  float highlight_lean;
+  std::array<uint8_t, 20> reserved;  ///< 0
 };
-static_assert(sizeof(FileHeader) == 128 && offsetof(FileHeader, level) == 32 && offsetof(FileHeader, reserved) == 104);
+static_assert(sizeof(FileHeader) == 128 && offsetof(FileHeader, level) == 32 && offsetof(FileHeader, reserved) == 108);
 
 struct SectionEntry {
   uint32_t id;             ///< SectionId

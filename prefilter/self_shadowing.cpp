@@ -11,6 +11,7 @@
 #include "prefilter/voxel_ratios.h"
 #include "scattering/albedo.h"
 #include "scattering/highlight.h"
+#include "scattering/highlight_lean.h"
 #include "scattering/hot_spot.h"
 #include "scattering/microfacet.h"
 #include "scattering/open_side.h"
@@ -31,11 +32,12 @@ constexpr double kLeastSpread = 1e-2;
 /// Light that goes on from what a line sees first.
 struct SentOn {
   vec3 direction{0.0f};
-  float weight = 0;      ///< how much light
-  bool is_base = false;  ///< not of the highlight: with a contrast, a side and an opening
-  float contrast = 0;    ///< L less its mean over the lobe: what the strength of the hot spot multiplies
-  vec3 side{0.0f};       ///< the normal on the line's side
-  vec3 opening{0.0f};    ///< what the open side multiplies: scattering/open_side.h, to first order
+  float weight = 0;  ///< how much light
+  enum class Kind { Highlight, Reflected, Through } kind = Kind::Highlight;
+  float contrast = 0;  ///< of reflected light, how much it is on the viewer's side: L less its mean; the phase's cosine
+  float slope = 0;     ///< what the hot spot's strength, or the highlight's lean, multiplies, to first order
+  vec3 side{0.0f};     ///< the normal on the line's side; 0 of the highlight
+  vec3 opening{0.0f};  ///< what the open side multiplies: scattering/open_side.h, to first order
 };
 
 /// Of the highlight of a flat piece with normal `seen`.
@@ -49,10 +51,15 @@ vec3 mirrored(float roughness2, const vec3& seen, const vec3& wo, float u1, floa
 template <typename Material>
 SentOn scattered_by_base(const Material& m, const vec3& seen, const vec3& direction, SplitMix& random) {
   const float through = component_sum(m.transmission), back = component_sum(m.diffuse);
-  const vec3 side = static_cast<float>(random.next_unit()) * (through + back) < through ? -seen : seen;
+  const bool is_through = static_cast<float>(random.next_unit()) * (through + back) < through;
   const auto u1 = to_unit_float(random.next()), u2 = to_unit_float(random.next());
-  SentOn sent{.direction = cosine_lobe(side, u1, u2), .is_base = true, .side = seen};
-  sent.contrast = hot_spot_lobe(-glm::dot(direction, sent.direction)) - mean_hot_spot_lobe(-glm::dot(direction, side));
+  SentOn sent{.direction = cosine_lobe(is_through ? -seen : seen, u1, u2), .side = seen};
+  sent.kind = is_through ? SentOn::Kind::Through : SentOn::Kind::Reflected;
+  if (!is_through) {
+    sent.contrast =
+        hot_spot_lobe(-glm::dot(direction, sent.direction)) - mean_hot_spot_lobe(-glm::dot(direction, seen));
+    sent.slope = sent.contrast;
+  }
   sent.opening = (1 - std::min((through + back) / 3, 1.0f)) * seen;
   return sent;
 }
@@ -71,6 +78,8 @@ std::optional<SentOn> scattered(const Material& m, const vec3& normal, const vec
   if (static_cast<float>(random.next_unit()) * (of_mirror + of_base) < of_mirror) {
     const auto u1 = to_unit_float(random.next()), u2 = to_unit_float(random.next());
     sent.direction = mirrored(m.roughness2, seen, -direction, u1, u2);
+    sent.contrast = -glm::dot(direction, sent.direction);
+    sent.slope = sent.contrast * (1 - std::min((of_mirror + of_base) / 3, 1.0f));
   } else {
     sent = scattered_by_base(m, seen, direction, random);
   }
@@ -113,9 +122,35 @@ std::optional<Collision> first_collision(const SparseVolume& volume, const LineS
 /// How much of the light that something sends on gets away.
 struct Escape {
   FixedSum sent, away;
-  FixedSum away_contrast;                ///< weighted with the contrast
-  std::array<FixedSum, 3> away_opening;  ///< the same with the opening
+  FixedSum sent_back, away_back;         ///< of it, what the base reflects
+  FixedSum sent_through, away_through;   ///< and what it lets through
+  FixedSum away_spot;                    ///< what the hot spot's strength multiplies
+  FixedSum away_lean;                    ///< what the highlight's lean multiplies
+  std::array<FixedSum, 3> away_opening;  ///< what the open side multiplies
 };
+
+/// How much light that gets away is on the viewer's side.
+struct Contrast {
+  FixedSum away, contrast, slope, product;
+
+  void add(double share_away, const SentOn& sent) {
+    away.add(share_away);
+    contrast.add(share_away * sent.contrast);
+    slope.add(share_away * sent.slope);
+    product.add(share_away * sent.contrast * sent.slope);
+  }
+};
+
+/// What makes the mean contrast of the medium's light that gets away the geometry's; in [least, most].
+float fitted_contrast(const Contrast& source, const Contrast& medium, float least, float most) {
+  const double away = medium.away.value();
+  if (!(source.away.value() > 0 && away > 0)) return 0;
+  const double wanted = source.contrast.value() / source.away.value();
+  // (contrast + x product) / (away + x slope) = wanted
+  const double rate = medium.product.value() - wanted * medium.slope.value();
+  if (!(rate > 0)) return 0;
+  return static_cast<float>(std::clamp((wanted * away - medium.contrast.value()) / rate, double{least}, double{most}));
+}
 
 /// What sides light gets away from.
 struct Sides {
@@ -132,6 +167,11 @@ struct Sides {
   }
 };
 
+std::vector<double> divided(std::vector<double> a, const std::vector<double>& b) {
+  for (size_t i = 0; i < a.size(); ++i) a[i] /= std::max(b[i], 1e-6);
+  return a;
+}
+
 dvec3 vector_of(const std::array<FixedSum, 3>& sums) { return {sums[0].value(), sums[1].value(), sums[2].value()}; }
 
 /// Light of one of two kinds: of the geometry, of the medium. Any thread may add.
@@ -140,26 +180,31 @@ struct Light {
 
   void add(uint32_t voxel, const SentOn& sent, double share_away) {
     const double away = share_away * sent.weight;
-    of_voxel[voxel].sent.add(sent.weight);
-    of_voxel[voxel].away.add(away);
-    of_voxel[voxel].away_contrast.add(away * sent.contrast);
-    for (int i = 0; i < 3; ++i) of_voxel[voxel].away_opening[static_cast<size_t>(i)].add(away * sent.opening[i]);
-    if (sent.is_base) {
-      away_of_base.add(away);
-      sides.add(away, sent);
+    Escape& escape = of_voxel[voxel];
+    escape.sent.add(sent.weight);
+    escape.away.add(away);
+    for (int i = 0; i < 3; ++i) escape.away_opening[static_cast<size_t>(i)].add(away * sent.opening[i]);
+    if (sent.kind == SentOn::Kind::Highlight) {
+      highlight.add(away, sent);
+      escape.away_lean.add(away * sent.slope);
+      return;
     }
-    contrast2.add(away * sent.contrast * sent.contrast);
-  }
-
-  double total(FixedSum Escape::*field) const {
-    double sum = 0;
-    for (const Escape& escape : of_voxel) sum += (escape.*field).value();
-    return sum;
+    away_of_base.add(away);
+    sides.add(away, sent);
+    if (sent.kind == SentOn::Kind::Through) {
+      escape.sent_through.add(sent.weight);
+      escape.away_through.add(away);
+    } else {
+      escape.sent_back.add(sent.weight);
+      escape.away_back.add(away);
+      back.add(away, sent);
+      escape.away_spot.add(away * sent.slope);
+    }
   }
 
   std::vector<Escape> of_voxel;
   FixedSum away_of_base;
-  FixedSum contrast2;
+  Contrast back, highlight;
   Sides sides;
 };
 
@@ -173,9 +218,13 @@ class EscapeMeasurement {
     add_medium(line, random);
   }
 
-  float hot_spot_strength() const;
+  float hot_spot() const { return fitted_contrast(source_.back, medium_.back, 0, kStrongestHotSpot); }
+  float highlight_lean() const {
+    return fitted_contrast(source_.highlight, medium_.highlight, -kMostHighlightLean, kMostHighlightLean);
+  }
   vec3 open_side() const;
-  std::vector<double> ratios(float strength, const vec3& open_side) const;
+  std::vector<double> ratios() const;
+  std::vector<double> ratios_through() const;
 
  private:
   void add_source(const SeenLine& line, SplitMix& random);
@@ -183,6 +232,16 @@ class EscapeMeasurement {
   /// What the macrosurface stops it stops for both: it says nothing.
   bool meets_macrosurface(const vec3& from, const SentOn& sent, SplitMix& random) const {
     return scene_.is_stopped_by_macrosurface(from, sent.direction, near(), kFar, random);
+  }
+  /// Of each voxel's light, away / sent, both of an Escape.
+  template <typename Away, typename Sent>
+  std::vector<double> shares(const Light& light, const Away& away, const Sent& sent) const {
+    std::vector<SourceAndMedium> sums(light.of_voxel.size());
+    for (size_t v = 0; v < sums.size(); ++v) {
+      sums[v].source.add(away(light.of_voxel[v]));
+      sums[v].medium.add(sent(light.of_voxel[v]));
+    }
+    return shrunk_ratios(volume_, sums, kPriorLight);
   }
   float near() const { return kClearance * static_cast<float>(scene_.lattice().voxel_size); }
 
@@ -210,17 +269,6 @@ void EscapeMeasurement::add_medium(const SeenLine& line, SplitMix& random) {
   medium_.add(collision->voxel, *sent, std::exp(-optical_depth(volume_, scene_.grid(), away)));
 }
 
-/// Mean contrast of the light that gets away must be the geometry's.
-float EscapeMeasurement::hot_spot_strength() const {
-  const double source = source_.away_of_base.value(), medium = medium_.away_of_base.value();
-  if (!(source > 0 && medium > 0)) return 0;
-  const double wanted = source_.total(&Escape::away_contrast) / source;
-  const double first = medium_.total(&Escape::away_contrast), second = medium_.contrast2.value();
-  const double slope = second - wanted * first;
-  if (!(slope > 0)) return 0;
-  return static_cast<float>(std::clamp((wanted * medium - first) / slope, 0.0, double{kStrongestHotSpot}));
-}
-
 /// The mean side of the light that gets away must be the geometry's.
 vec3 EscapeMeasurement::open_side() const {
   const double source = source_.away_of_base.value(), medium = medium_.away_of_base.value();
@@ -238,26 +286,38 @@ vec3 EscapeMeasurement::open_side() const {
   return vec3(length > kMostOpenSide ? x * (kMostOpenSide / length) : x);
 }
 
-/// What gets away of the geometry's light by what gets away of the medium's with such a hot spot and such sides, voxel
-/// by voxel.
-std::vector<double> EscapeMeasurement::ratios(float strength, const vec3& open_side) const {
-  const auto escapes = [&](const Light& light, double of_contrast, const dvec3& of_opening) {
-    std::vector<SourceAndMedium> sums(light.of_voxel.size());
-    for (size_t v = 0; v < sums.size(); ++v) {
-      const Escape& of_voxel = light.of_voxel[v];
-      sums[v].source.add(of_voxel.away.value() + of_contrast * of_voxel.away_contrast.value() +
-                         glm::dot(of_opening, vector_of(of_voxel.away_opening)));
-      sums[v].medium.add(of_voxel.sent.value());
-    }
-    return shrunk_ratios(volume_, sums, kPriorLight);
+/// What gets away of the geometry's light by what gets away of the medium's, as the volume has it by now, voxel by
+/// voxel.
+std::vector<double> EscapeMeasurement::ratios() const {
+  const auto medium_away = [&](const Escape& escape) {
+    return escape.away.value() + double{volume_.hot_spot} * escape.away_spot.value() +
+           double{volume_.highlight_lean} * escape.away_lean.value() +
+           glm::dot(dvec3(volume_.open_side), vector_of(escape.away_opening));
   };
-  std::vector<double> result = escapes(source_, 0, dvec3(0));
-  const std::vector<double> medium = escapes(medium_, strength, dvec3(open_side));
-  for (size_t v = 0; v < result.size(); ++v) result[v] /= std::max(medium[v], 1e-6);
-  return result;
+  const auto source_away = [](const Escape& escape) { return escape.away.value(); };
+  const auto sent = [](const Escape& escape) { return escape.sent.value(); };
+  return divided(shares(source_, source_away, sent), shares(medium_, medium_away, sent));
+}
+
+/// How much more of the light gets away that flakes let through than of what they reflect, in the geometry by what it
+/// does in the medium.
+std::vector<double> EscapeMeasurement::ratios_through() const {
+  const auto odds = [&](const Light& light) {
+    const auto value = [](FixedSum Escape::*field) { return [field](const Escape& e) { return (e.*field).value(); }; };
+    return divided(shares(light, value(&Escape::away_through), value(&Escape::sent_through)),
+                   shares(light, value(&Escape::away_back), value(&Escape::sent_back)));
+  };
+  return divided(odds(source_), odds(medium_));
 }
 
 }  // namespace
+
+void let_through(double ratio, Voxel& voxel) {
+  const auto odds = static_cast<float>(std::clamp(ratio, kLeastThrough, kMostThrough));
+  const vec3 base = voxel.diffuse + voxel.transmission;
+  voxel.transmission = base * cluster_albedo(voxel.transmission / glm::max(base, vec3(1e-6f)), odds);
+  voxel.diffuse = glm::max(base - voxel.transmission, vec3(0.0f));
+}
 
 void let_escape(double ratio, Voxel& voxel) {
   const auto share = static_cast<float>(std::clamp(ratio, kLeastEscape, kMostEscape));
@@ -275,10 +335,14 @@ Result<void> measure_self_shadowing(const LineScene& scene, SparseVolume& volume
   EscapeMeasurement measurement(scene, volume);
   FARFIELD_TRY(for_lines(scene, {options.lines, options.seed, options.job},
                          [&](const SeenLine& line, SplitMix& random) { measurement.add(line, random); }));
-  volume.hot_spot = measurement.hot_spot_strength();
+  volume.hot_spot = measurement.hot_spot();
+  volume.highlight_lean = measurement.highlight_lean();
   volume.open_side = measurement.open_side();
-  const std::vector<double> ratios = measurement.ratios(volume.hot_spot, volume.open_side);
-  for (size_t v = 0; v < ratios.size(); ++v) let_escape(ratios[v], volume.voxels[v]);
+  const std::vector<double> through = measurement.ratios_through(), ratios = measurement.ratios();
+  for (size_t v = 0; v < ratios.size(); ++v) {
+    let_through(through[v], volume.voxels[v]);
+    let_escape(ratios[v], volume.voxels[v]);
+  }
   return {};
 }
 

@@ -21,6 +21,12 @@ inline constexpr double kLeastEscape = 0.02, kMostEscape = 2;
 /// the bounds above): less by self-shadowing A = ratio, more by a higher albedo. White stays white.
 void let_escape(double ratio, Voxel& voxel);
 
+/// Bounds of how much more a geometry lets through, by what its medium does.
+inline constexpr double kLeastThrough = 0.25, kMostThrough = 4;
+
+/// Multiplies the odds of light to go through the voxel's flakes instead of back; they absorb as much as before.
+void let_through(double ratio, Voxel& voxel);
+
 struct SelfShadowingOptions {
   double lines = 0;
   uint64_t seed = 0;

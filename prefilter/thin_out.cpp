@@ -62,6 +62,7 @@ SparseVolume thin_out(const SparseVolume& volume, uint64_t seed) {
   SparseVolume result;
   result.lattice = volume.lattice;
   result.hot_spot = volume.hot_spot;
+  result.highlight_lean = volume.highlight_lean;
   result.open_side = volume.open_side;
   for (VoxelBrick brick : volume.bricks) {
     uint64_t next = brick.first_voxel;

@@ -41,8 +41,10 @@ struct SparseVolume {
   VoxelLattice lattice;
   std::vector<VoxelBrick> bricks;  ///< none empty; sorted by z, then y, then x
   std::vector<Voxel> voxels;
-  float hot_spot = 0;    ///< of all voxels (scattering/hot_spot.h). Not measured by voxelize()
-  vec3 open_side{0.0f};  ///< of all voxels (scattering/open_side.h). Not measured by voxelize()
+  // Of all voxels; not measured by voxelize().
+  float hot_spot = 0;        ///< scattering/hot_spot.h
+  float highlight_lean = 0;  ///< scattering/highlight_lean.h
+  vec3 open_side{0.0f};      ///< scattering/open_side.h
 };
 
 /// Some of the bricks that may hold voxels, by their number in the order of SparseVolume::bricks. Ranges that follow

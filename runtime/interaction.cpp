@@ -119,6 +119,7 @@ FlakeParams flake_params(const LevelView& level, const InstanceRecord& instance,
   params.roughness2 = unorm_at(level.voxel_roughness2, voxel);
   params.self_shadowing = unorm_at(level.voxel_self_shadowing, voxel);
   params.hot_spot = level.header.hot_spot;
+  params.highlight_lean = level.header.highlight_lean;
   if (level.header.open_side != vec3(0.0f)) params.open_side = open_side_to_world(level.header.open_side, inverse);
   return params;
 }

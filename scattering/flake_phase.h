@@ -12,9 +12,9 @@
 // light that meets another flake close by is coloured again. The thesis stores albedo_ms per voxel instead (14.1.16);
 // this needs no bytes and keeps white white.
 //
-// Reciprocal in the sense of anisotropic media, sigma(wo) f(wo, wi) = sigma(wi) f(wi, wo), but for the hot spot and for
-// open sides (scattering/hot_spot.h, open_side.h), and of light that goes through these; the integral over wi is at
-// most 1, and 1 where diffuse + transmission = 1.
+// Reciprocal in the sense of anisotropic media, sigma(wo) f(wo, wi) = sigma(wi) f(wi, wo), but for the hot spot, for
+// highlights that lean and for open sides (scattering/hot_spot.h, highlight_lean.h, open_side.h), and of light that
+// goes through these; the integral over wi is at most 1, and 1 where diffuse + transmission = 1.
 #pragma once
 
 #include "base/random.h"
@@ -37,6 +37,7 @@ struct FlakeParams {
   float roughness2 = 1.0f;
   float self_shadowing = 1.0f;  ///< A in (0, 1]; 1: none
   float hot_spot = 0.0f;        ///< strength in [0, kStrongestHotSpot] (scattering/hot_spot.h); 0: none
+  float highlight_lean = 0.0f;  ///< at most kMostHighlightLean, either way (scattering/highlight_lean.h); 0: none
   vec3 open_side{0.0f};         ///< at most kMostOpenSide long (scattering/open_side.h); 0: both sides are alike
 };
 
@@ -70,6 +71,7 @@ class FlakeModel {
     CholeskyFactor<float> facets;  ///< of specular_sggx(sggx, roughness2), for pdf()
     vec3 f0{0.0f};                 ///< 0: these flakes have no highlight
     float roughness2 = 1;
+    float lean = 0;
   };
   /// What only self-shadowing needs.
   struct Multiple {

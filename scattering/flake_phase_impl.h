@@ -74,7 +74,8 @@ vec3 FlakeModel<kChannels>::set_up_specular(const FlakeParams& params, const Sym
   const float roughness2 = params.roughness2 < 1.0f ? std::max(params.roughness2, 0.0f) : 1.0f;
   const Highlight highlight(params.specular, roughness2);
   if (!highlight.exists()) return vec3(0.0f);
-  specular_ = {cholesky(specular_sggx(s, roughness2)), clamp_albedo(params.specular), roughness2};
+  specular_ = {cholesky(specular_sggx(s, roughness2)), clamp_albedo(params.specular), roughness2,
+               params.highlight_lean};
 
   const vec3 mean = highlight.mean_albedo();
   const float left = 1.0f - min_component(mean);
@@ -114,7 +115,10 @@ typename FlakeModel<kChannels>::Flake FlakeModel<kChannels>::sample_flake(Rng& r
   SurfaceParams params;
   if constexpr (kHasDiffuse) params.diffuse = diffuse_;
   if constexpr (kHasTransmission) params.transmission = transmission_;
-  if constexpr (kHasSpecular) params.specular = specular_.f0, params.roughness2 = specular_.roughness2;
+  if constexpr (kHasSpecular) {
+    params.specular = specular_.f0, params.roughness2 = specular_.roughness2;
+    params.highlight_lean = specular_.lean;
+  }
   if constexpr (kHasBase) {
     if (open_side_ != vec3(0.0f)) open(m, params);
   }

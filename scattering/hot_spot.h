@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // The hot spot of foliage: light that arrives from where the viewer is has a way free of leaves, since the viewer's own
 // way is free; light from the other side meets the clump that the viewer sees the front of. A medium does not know.
-// With the phase angle between wo and wi, and m the scatterer's normal, a Lambertian lobe is multiplied by
+// With the phase angle between wo and wi, and m the scatterer's normal, what a Lambertian surface reflects is
+// multiplied by
 //
 //   1 + strength (L(wo.wi) - mean of L over the lobe)
 //
 // with L(c) = -ln((1 - c + e) / (2 + e)) / 2, about -ln sin(angle / 2).
-// As much light leaves in all, for each flake. L is what trees show (docs/decisions/0017); leaf optics has
-// other forms, with one or two more parameters [Kuusk 1985].
+// As much light leaves in all, for each flake. What goes through a leaf was measured to know nothing of that angle
+// (docs/decisions/0024), and highlights have their own way (scattering/highlight_lean.h). L is what trees show
+// (docs/decisions/0017); leaf optics has other forms, with one or two more parameters [Kuusk 1985].
 #pragma once
 
 #include <algorithm>

@@ -10,6 +10,7 @@
 #pragma once
 
 #include "base/vec.h"
+#include "scattering/albedo.h"
 
 namespace farfield {
 
@@ -18,8 +19,7 @@ inline constexpr float kMostOpenSide = 0.5f;
 
 /// What the diffuse reflectance and transmission of a side (their sum `base`, in [0, 1]) are multiplied by.
 inline vec3 open_side_gain(const vec3& open_side, const vec3& normal, const vec3& base) {
-  const float share = 1.0f + glm::dot(open_side, normal);
-  return share / (vec3(1.0f) - base + share * base);
+  return odds_gain(base, 1.0f + glm::dot(open_side, normal));
 }
 
 }  // namespace farfield

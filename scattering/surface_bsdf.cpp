@@ -6,7 +6,7 @@ namespace farfield {
 
 template class SurfaceModel<kSurfaceChannels>;
 
-static_assert(sizeof(SurfaceBsdf) <= 160);
+static_assert(sizeof(SurfaceBsdf) <= 176);
 static_assert(sizeof(SurfaceModel<kDiffuse>) <= 64);
 
 }  // namespace farfield

@@ -25,12 +25,13 @@ struct SurfaceParams {
   vec3 diffuse{0.0f};   ///< of the light that the highlight leaves; so is transmission
   vec3 specular{0.0f};  ///< F0; Schlick's Fresnel; 0 means no highlight at all
   vec3 transmission{0.0f};
-  float roughness2 = 1.0f;  ///< alpha^2
-  float hot_spot = 0.0f;    ///< of the base, in [0, kStrongestHotSpot]: for flakes (scattering/hot_spot.h)
+  float roughness2 = 1.0f;      ///< alpha^2
+  float hot_spot = 0.0f;        ///< of the diffuse part, in [0, kStrongestHotSpot]: for flakes (scattering/hot_spot.h)
+  float highlight_lean = 0.0f;  ///< at most kMostHighlightLean: for flakes (scattering/highlight_lean.h)
 };
 
 /// A face seen from wo, with the given channels (scattering/channels.h); parameters of the others are not looked at.
-/// Directions are unit, away from the point. Immutable; any thread. At most 160 bytes, no allocation.
+/// Directions are unit, away from the point. Immutable; any thread. At most 176 bytes, no allocation.
 template <unsigned kChannels>
 class SurfaceModel {
  public:
@@ -54,6 +55,8 @@ class SurfaceModel {
     Highlight highlight;
     Microfacets facets;   ///< valid if the highlight exists
     vec3 multiple{0.0f};  ///< times (1 - E(wi)) / pi: what facets reflect onto each other
+    vec3 albedo{0.0f};    ///< of the whole surface; set if the highlight leans
+    float lean = 0;
   };
 
   void couple_to_highlight(const SurfaceParams& params) requires(kHasSpecular);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "scattering/albedo.h"
+#include "scattering/highlight_lean.h"
 #include "scattering/hot_spot.h"
 #include "scattering/microfacet_brdf.h"
 #include "scattering/surface_bsdf.h"
@@ -37,6 +38,13 @@ void SurfaceModel<kChannels>::couple_to_highlight(const SurfaceParams& params) r
                highlight.multiple_lobe() * (1 - share.all)};
 
   const vec3 returned = highlight.albedo(share), once = highlight.once(share);
+  if (params.highlight_lean != 0) {
+    vec3 base(0.0f);
+    if constexpr (kHasDiffuse) base += diffuse_;
+    if constexpr (kHasTransmission) base += transmission_;
+    specular_.albedo = layered_albedo(returned, base);
+    specular_.lean = params.highlight_lean;
+  }
   const float left = 1 - min_component(returned);
   specular_chance_ = max_component(once);
   diffuse_chance_ = diffuse_chance_ * left + max_component(returned - once);
@@ -57,7 +65,7 @@ vec3 SurfaceModel<kChannels>::eval(const vec3& wi) const {
   if constexpr (kHasTransmission) {
     if (cos_i < 0) base = transmission_;
   }
-  if (hot_spot_ > 0) base *= hot_spot(hot_spot_, glm::dot(wo_, wi), cos_i > 0 ? cos_o_ : -cos_o_);
+  if (hot_spot_ > 0 && cos_i > 0) base *= hot_spot(hot_spot_, glm::dot(wo_, wi), cos_o_);
   if constexpr (kHasSpecular) {
     if (specular_.highlight.exists()) {
       const HighlightShare share = specular_.highlight.share(std::abs(cos_i));
@@ -66,6 +74,7 @@ vec3 SurfaceModel<kChannels>::eval(const vec3& wi) const {
         base += specular_.multiple * (1 - share.all);
         highlight = eval_specular_facets<Masking::HeightCorrelated>(
             specular_.facets, wo_, cos_o_, wi, cos_i, [this](float cos) { return specular_.highlight.fresnel(cos); });
+        if (specular_.lean != 0) highlight *= highlight_lean_gain(specular_.lean, glm::dot(wo_, wi), specular_.albedo);
       }
     }
   }

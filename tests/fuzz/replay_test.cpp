@@ -49,6 +49,7 @@ TEST(FuzzReplay, LevelFile) {
   EXPECT_GT(run_folder(fuzz_level_file, FARFIELD_FUZZ_REGRESSIONS "/level_file"), 0);
   run_damaged(fuzz_level_file, FARFIELD_TEST_DATA "/format_v1/level_3.ffl");
   run_damaged(fuzz_level_file, FARFIELD_TEST_DATA "/format_v4/level_3.ffl");
+  run_damaged(fuzz_level_file, FARFIELD_TEST_DATA "/format_v5/level_3.ffl");
 }
 
 TEST(FuzzReplay, Manifest) {

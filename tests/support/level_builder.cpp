@@ -252,6 +252,12 @@ LevelData full_level_of_version_4() {
   return level;
 }
 
+LevelData full_level_of_version_5() {
+  LevelData level = full_level_of_version_4();
+  level.header.highlight_lean = -0.25f;
+  return level;
+}
+
 LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks) {
   Rng rng(seed);
   LevelData level;
@@ -308,6 +314,7 @@ LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks) {
     }
   }
   if (bricks > 0 && has()) level.header.hot_spot = 0.5f * rng.next();
+  if (bricks > 0 && has()) level.header.highlight_lean = rng.next() - 0.5f;
   if (has()) level.voxel_octants = noise<PackedOctants>(voxel_count(level), rng);
   return level;
 }

@@ -60,6 +60,8 @@ LevelData full_level_of_version_2();
 LevelData full_level_of_version_3();
 /// And with those of the fourth.
 LevelData full_level_of_version_4();
+/// And of the fifth.
+LevelData full_level_of_version_5();
 
 /// A random sound level: `quads` quads, `bricks` bricks, channels picked by the seed.
 LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks);

@@ -34,6 +34,7 @@ void expect_same(const LevelView& a, const LevelView& b) {
   EXPECT_EQ(a.header.volume_origin, b.header.volume_origin);
   EXPECT_EQ(a.header.hot_spot, b.header.hot_spot);
   EXPECT_EQ(a.header.open_side, b.header.open_side);
+  EXPECT_EQ(a.header.highlight_lean, b.header.highlight_lean);
   std::vector<std::span<const std::byte>> sections;
   for_each_section(a, [&](SectionId, const auto& array) { sections.push_back(std::as_bytes(array)); });
   size_t i = 0;
@@ -147,6 +148,10 @@ TEST(LevelFormat, GoldenBytesOfVersion3AreFrozen) {
 
 TEST(LevelFormat, GoldenBytesOfVersion4AreFrozen) {
   expect_frozen("/format_v4/level_3.ffl", 4416u, test::full_level_of_version_4());
+}
+
+TEST(LevelFormat, GoldenBytesOfVersion5AreFrozen) {
+  expect_frozen("/format_v5/level_3.ffl", 4416u, test::full_level_of_version_5());
 }
 
 TEST(LevelFormat, OctantsMustBelongToVoxels) {
@@ -290,11 +295,11 @@ TEST(HostileLevelFile, HeaderAndTableFieldsAreChecked) {
   const std::vector<Case> cases = {
       {"does not start as a level file", [](auto& h, auto*) { h.magic[1] = 'X'; }},
       {"the format version is 0", [](auto& h, auto*) { h.version = 0; }},
-      {"level format 5, and this Farfield reads up to 4", [](auto& h, auto*) { h.version = 5; },
+      {"level format 6, and this Farfield reads up to 5", [](auto& h, auto*) { h.version = 6; },
        ErrorCode::Unsupported},
       {"the header says", [](auto& h, auto*) { h.file_bytes = kHuge; }},
       {"sections leaves the file", [](auto& h, auto*) { h.section_count = 0xffffffffu; }},
-      {"reserved bytes", [](auto& h, auto*) { h.reserved[23] = 1; }},
+      {"reserved bytes", [](auto& h, auto*) { h.reserved[19] = 1; }},
       {"the hot spot's strength is -0.1", [](auto& h, auto*) { h.hot_spot = -0.1f; }},
       {"the hot spot's strength is 0.71", [](auto& h, auto*) { h.hot_spot = 0.71f; }},
       {"the open side is (0, 0.6, 0)",
@@ -305,6 +310,8 @@ TEST(HostileLevelFile, HeaderAndTableFieldsAreChecked) {
        [](auto& h, auto*) {
          h.open_side = {NAN, 0, 0};
        }},
+      {"the highlight leans by -0.71", [](auto& h, auto*) { h.highlight_lean = -0.71f; }},
+      {"the highlight leans by nan", [](auto& h, auto*) { h.highlight_lean = NAN; }},
       {"the hot spot's strength is nan", [](auto& h, auto*) { h.hot_spot = NAN; }},
       {"the resolution is 0", [](auto& h, auto*) { h.resolution = 0; }},
       {"the resolution is nan", [](auto& h, auto*) { h.resolution = NAN; }},

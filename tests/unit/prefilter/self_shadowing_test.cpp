@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "prefilter/measure_volume.h"
+#include "scattering/highlight_lean.h"
 #include "scattering/hot_spot.h"
 #include "tests/support/surfaces.h"
 
@@ -45,6 +46,21 @@ TEST(LetEscape, StaysWithinItsBounds) {
   EXPECT_NEAR(none.self_shadowing, kLeastEscape, 1e-6);
   let_escape(1e30, all);
   EXPECT_NEAR(all.diffuse.y, 2 * 0.3 / 1.3, 1e-6);
+}
+
+TEST(LetThrough, MovesLightFromOneSideToTheOtherAndKeepsItsSum) {
+  Voxel voxel = grey();
+  voxel.diffuse = {0.2f, 0.5f, 0.0f}, voxel.transmission = {0.2f, 0.5f, 0.0f};
+  let_through(0.5, voxel);
+  EXPECT_NEAR(voxel.transmission.x, 0.4 / 3, 1e-6);
+  EXPECT_NEAR(voxel.transmission.y, 1.0 / 3, 1e-6);
+  EXPECT_NEAR(voxel.diffuse.x + voxel.transmission.x, 0.4, 1e-6);
+  EXPECT_NEAR(voxel.diffuse.y + voxel.transmission.y, 1, 1e-6);
+  EXPECT_EQ(voxel.diffuse.z + voxel.transmission.z, 0);
+  Voxel opaque = grey();
+  let_through(1e30, opaque);
+  EXPECT_EQ(opaque.diffuse, grey().diffuse);
+  EXPECT_EQ(opaque.transmission, vec3(0.0f));
 }
 
 SparseVolume voxelized(const Surface& geometry, double voxel_size) {
@@ -119,8 +135,39 @@ TEST(OpenSide, OfFoldedLeavesIsTheSideThatBulges) {
   EXPECT_LT(glm::length(flat), 0.05f);
 }
 
-// The same leaves in tufts, each much smaller than a voxel: most of the light meets another leaf of the same tuft.
-TEST(SelfShadowing, OfTuftsIsStrong) {
+double share_through(const Surface& leaves) {
+  double through = 0, all = 0;
+  for (const Voxel& v : voxelized(leaves, 1.0 / 4).voxels) {
+    through += v.density * v.transmission.x;
+    all += v.density * (v.transmission.x + v.diffuse.x);
+  }
+  return through / all;
+}
+
+/// Every leaf twice, one above the other.
+Surface in_pairs(const Surface& leaves, float gap) {
+  Surface pairs = leaves;
+  const auto first = static_cast<uint32_t>(leaves.positions.size());
+  for (const vec3& p : leaves.positions) pairs.positions.push_back(p + vec3(0, 0, gap));
+  for (size_t t = 0; t < leaves.triangles.size(); ++t) {
+    pairs.triangles.push_back(leaves.triangles[t] + first);
+    pairs.materials.push_back(leaves.materials[t]);
+  }
+  return pairs;
+}
+
+// Of two leaves on top of each other what goes through one meets the other; what one reflects is free.
+TEST(Through, OfLeavesInPairsIsLess) {
+  LeafCloud cloud;
+  cloud.count = 1500, cloud.leaf_size = 0.03f;
+  Surface single = leaf_cloud(cloud);
+  for (FaceMaterial& m : single.materials) m.diffuse = vec3(0.2f), m.transmission = vec3(0.2f);
+  EXPECT_NEAR(share_through(single), 0.5, 0.02);
+  EXPECT_LT(share_through(in_pairs(single, 0.004f)), 0.4);
+}
+
+/// Leaves in tufts, each much smaller than a voxel.
+Surface tufts() {
   LeafCloud cloud;
   cloud.count = 20000, cloud.leaf_size = 0.012f;
   Surface leaves = leaf_cloud(cloud);
@@ -130,7 +177,24 @@ TEST(SelfShadowing, OfTuftsIsStrong) {
     const vec3 tuft = (glm::floor(8.0f * middle) + 0.5f) / 8.0f;
     for (size_t k = i; k < i + 4; ++k) leaves.positions[k] += 0.8f * (tuft - middle);
   }
-  EXPECT_LT(means_of(voxelized(leaves, 1.0 / 4)).self_shadowing, 0.8);
+  return leaves;
+}
+
+// Most of the light meets another leaf of the same tuft.
+TEST(SelfShadowing, OfTuftsIsStrong) { EXPECT_LT(means_of(voxelized(tufts(), 1.0 / 4)).self_shadowing, 0.8); }
+
+// What glances off a tuft on the viewer's side is free; what glances off its leaves away from the viewer is not.
+TEST(HighlightLean, OfTuftsIsTowardsTheViewer) {
+  LeafCloud cloud;
+  cloud.count = 4000, cloud.leaf_size = 0.012f;
+  const auto lean = [](Surface leaves) {
+    for (FaceMaterial& m : leaves.materials) m.diffuse = vec3(0.05f), m.specular = vec3(0.04f), m.roughness2 = 0.1f;
+    return voxelized(leaves, 1.0 / 4).highlight_lean;
+  };
+  const float alone = lean(leaf_cloud(cloud)), of_tufts = lean(tufts());
+  EXPECT_NEAR(alone, 0, 0.1);
+  EXPECT_GT(of_tufts, alone + 0.1f);
+  EXPECT_LE(of_tufts, kMostHighlightLean);
 }
 
 // At 1e-18 squares of the normals are no floats any more; what Embree still hits there must give sound voxels.
