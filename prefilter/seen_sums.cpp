@@ -2,7 +2,7 @@
 #include "prefilter/seen_sums.h"
 
 #include "prefilter/density.h"
-#include "scattering/sggx.h"
+#include "scattering/normal_moments.h"
 
 namespace farfield {
 namespace {
@@ -48,10 +48,10 @@ void SeenSums::apply(double prior, Voxel& voxel) const {
   mix(transmission_, voxel.transmission);
 
   const double before = mean_sigma(voxel.sggx);
-  const SymMat3 own = voxel.sggx * (1 / voxel.sggx.trace());  // as a face's
+  const SymMat3 own = normal_moments(voxel.sggx);
   const SymMat3 seen{mixed(own.xx, sggx_[0]), mixed(own.yy, sggx_[1]), mixed(own.zz, sggx_[2]),
                      mixed(own.xy, sggx_[3]), mixed(own.xz, sggx_[4]), mixed(own.yz, sggx_[5])};
-  voxel.sggx = normalise_sggx(seen).sggx;
+  voxel.sggx = sggx_of_moments(seen);
   voxel.density *= static_cast<float>(before / mean_sigma(voxel.sggx));
 }
 

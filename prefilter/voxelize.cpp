@@ -17,7 +17,7 @@
 #include "prefilter/density.h"
 #include "prefilter/ray_scene.h"
 #include "prefilter/thin_out.h"
-#include "scattering/sggx.h"
+#include "scattering/normal_moments.h"
 
 namespace farfield {
 namespace {
@@ -133,7 +133,7 @@ Voxel measure_voxel(const Measurement& m, const ivec3& coordinate) {
 
   const double depth = optical_depth_of_hits(sums.hits, rays);
   const float share = 1 / static_cast<float>(sums.hits);
-  voxel.sggx = normalise_sggx(sums.sggx).sggx;
+  voxel.sggx = sggx_of_moments(sums.sggx);
   voxel.density = static_cast<float>(solve_density(voxel.sggx, depth, size));
   voxel.diffuse = sums.diffuse * share;
   voxel.specular = sums.specular * share;
