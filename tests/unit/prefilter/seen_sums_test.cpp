@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "prefilter/density.h"
+#include "scattering/normal_moments.h"
 
 namespace farfield {
 namespace {
