@@ -54,6 +54,7 @@ class PathTracer {
   PathRay leave(const Interaction& vertex, const ScatterSample& sample, const PathRay& incoming) const;
   void add_environment(const PathRay& ray);
   void add_sampled_environment(const Interaction& vertex, const PathRay& incoming);
+  bool is_worth_a_ray(const Interaction& vertex, vec3& scattered);
   void add_point_lights(const Interaction& vertex, const PathRay& incoming);
   void add(const vec3& radiance);
   bool survives_roulette();
@@ -139,13 +140,26 @@ void PathTracer::add_sampled_environment(const Interaction& vertex, const PathRa
   if (options_.strategy == LightStrategy::ScatterRays) return;
   const EnvironmentSample light = lights_.environment.sample(depth_ == 1 ? light_choice_ : rng_.next(), rng_);
   if (!(light.pdf > 0)) return;
-  const vec3 scattered = vertex.eval(light.wi, rng_);
-  if (!(max_component(scattered) > 0)) return;
+  vec3 scattered = vertex.eval(light.wi, rng_);
+  if (!is_worth_a_ray(vertex, scattered)) return;
   const ScatterSample as_scattered{light.wi, vec3(0.0f), vertex.pdf(light.wi)};
   if (is_occluded(leave(vertex, as_scattered, incoming), kInfinity)) return;
   const bool mixed = options_.strategy == LightStrategy::Mis;
   const float weight = mixed ? power_weight(light.pdf, as_scattered.pdf) : 1.0f;
   add(scattered * light.radiance * (weight / light.pdf));
+}
+
+// Light that a vertex hardly scatters (a flake's far side, a face at grazing) is looked for less often, and counts the
+// more: most shadow rays of volumes would otherwise carry next to nothing.
+bool PathTracer::is_worth_a_ray(const Interaction& vertex, vec3& scattered) {
+  constexpr float kFaint = 0.1f;  // of what a Lambertian surface of that albedo scatters at most
+  const float brightest = max_component(scattered), usual = kFaint * kInvPi * max_component(vertex.albedo);
+  if (!(brightest > 0)) return false;
+  if (brightest >= usual) return true;
+  const float probability = brightest / usual;
+  if (!(rng_.next() < probability)) return false;
+  scattered /= probability;
+  return true;
 }
 
 // Lights without extent are only ever sampled, so they need no weight.
@@ -158,8 +172,8 @@ void PathTracer::add_point_lights(const Interaction& vertex, const PathRay& inco
     const vec3 wi = to_light / distance;
     const float falloff = spot_falloff(light, -wi);
     if (falloff <= 0) continue;
-    const vec3 scattered = vertex.eval(wi, rng_);
-    if (!(max_component(scattered) > 0)) continue;
+    vec3 scattered = vertex.eval(wi, rng_);
+    if (!is_worth_a_ray(vertex, scattered)) continue;
     const ScatterSample as_scattered{wi, vec3(0.0f), vertex.pdf(wi)};
     const PathRay ray = leave(vertex, as_scattered, incoming);
     if (is_occluded(ray, glm::length(light.position - ray.origin))) continue;
