@@ -63,6 +63,13 @@ Result<uint32_t> parse_rays_per_voxel(std::string_view text) {
   return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a number from 1 to 1000000", text));
 }
 
+Result<Part> parse_part(std::string_view text) {
+  const auto part = read_pair(text, '/', 0, 1000000);
+  if (part && part->first < part->second)
+    return Part{static_cast<uint32_t>(part->first), static_cast<uint32_t>(part->second)};
+  return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a part such as 0/8 to 7/8", text));
+}
+
 tl::unexpected<Error> is_there_twice(std::string_view value) {
   return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is there twice", value));
 }

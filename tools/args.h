@@ -26,6 +26,12 @@ Result<uint32_t> parse_finest_grid(std::string_view text);
 /// Reads a number in [1, 1000000]. Errors: InvalidArgument.
 Result<uint32_t> parse_rays_per_voxel(std::string_view text);
 
+struct Part {
+  uint32_t number = 0, count = 1;
+};
+/// Reads "3/8": number < count, count in [1, 1000000]. Errors: InvalidArgument.
+Result<Part> parse_part(std::string_view text);
+
 /// The error for a value that a list has again.
 tl::unexpected<Error> is_there_twice(std::string_view value);
 /// Reads values with commas between them, each by `parse` and none twice: "1,0.5,2". Errors: those of `parse`,

@@ -67,6 +67,14 @@ TEST(ParseRaysPerVoxel, ReadsCounts) {
   for (const char* text : {"0", "-1", "1.5", "", "1000001"}) EXPECT_FALSE(parse_rays_per_voxel(text)) << text;
 }
 
+TEST(ParsePart, ReadsANumberBelowACount) {
+  EXPECT_EQ(parse_part("3/8")->number, 3u);
+  EXPECT_EQ(parse_part("3/8")->count, 8u);
+  EXPECT_TRUE(parse_part("0/1"));
+  for (const char* text : {"", "/", "8/8", "9/8", "-1/8", "0/0", "1", "1/", "a/b", "1/2/3"})
+    EXPECT_FALSE(parse_part(text)) << text;
+}
+
 TEST(ParseList, ReadsEachValueAndRefusesTheSameTwice) {
   EXPECT_EQ(parse_list(std::string_view("1,0.5,2"), parse_pixel_error).value(), (std::vector<float>{1, 0.5f, 2}));
   EXPECT_EQ(parse_list(std::string_view("2G"), parse_budget).value(), (std::vector<uint64_t>{uint64_t{2} << 30}));
