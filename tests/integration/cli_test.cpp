@@ -606,6 +606,50 @@ TEST(SceneBake, PartsShareTheAssets) {
   EXPECT_EQ(bake("2/3").exit_code, 0);
 }
 
+/// A task script of scripts/slurm, as number `task`, without Slurm.
+ProcessOutput run_task(const std::string& script, int task, std::vector<std::string> arguments) {
+  setenv("FARFIELD", FARFIELD_TOOL, 1);
+  setenv("FARFIELD_TASK", std::to_string(task).c_str(), 1);
+  setenv("FARFIELD_MEMORY_MB", "300", 1);
+  arguments.insert(arguments.begin(), FARFIELD_SOURCE_DIR "/scripts/slurm/" + script);
+  return run_process(arguments);
+}
+
+TEST(Farm, TasksTogetherRenderTheShotWithinTheJobsMemory) {
+  const fs::path folder = fresh_folder("farm");
+  const std::string scene = (folder / "scene.gltf").string(), assets = (folder / "assets").string();
+  test::write_bush_scene(scene, 60);
+  const std::vector<std::string> how = {"--finest-grid", "16"};
+  for (int task = 0; task < 2; ++task) {
+    const ProcessOutput bake = run_task("bake_task", task, {scene, assets, "2", how[0], how[1]});
+    EXPECT_EQ(bake.exit_code, 0) << bake.err;
+  }
+  const std::vector<std::string> picture = {"--assets", assets, "--size", "16x8", "--spp", "1", how[0], how[1]};
+  const auto frames = [&](int task, const std::string& range) {
+    std::vector<std::string> arguments = {scene, (folder / "frames").string(), range, "2"};
+    arguments.insert(arguments.end(), picture.begin(), picture.end());
+    return run_task("shot_task", task, arguments);
+  };
+  for (int task = 0; task < 4; ++task) expect_quiet_success(frames(task, "2-10:2"));  // the fourth has nothing to do
+
+  std::vector<std::string> whole = {"shot",     scene,    "-o",       (folder / "whole").string(),
+                                    "--frames", "2-10:2", "--budget", "44M"};
+  whole.insert(whole.end(), picture.begin(), picture.end());
+  expect_quiet_success(farfield(whole));
+  for (const char* frame : {"02", "04", "06", "08", "10"}) {
+    const std::string name = std::string("frame_00") + frame + ".exr";
+    EXPECT_EQ(contents(folder / "frames" / name), contents(folder / "whole" / name)) << name;
+  }
+  EXPECT_EQ(Json::parse(contents(folder / "frames/tasks/2/shot.json"))["budget_bytes"], 44 << 20);
+  EXPECT_FALSE(fs::exists(folder / "frames/tasks/3"));
+
+  for (const char* range : {"", "5", "9-1:0", "0-9:x"}) {
+    const ProcessOutput wrong = frames(0, range);
+    EXPECT_EQ(wrong.exit_code, 2) << range;
+    EXPECT_EQ(wrong.err.rfind("shot_task: ", 0), 0u) << wrong.err;
+  }
+}
+
 /// Warnings first, one a line, then the error.
 void expect_warning_before_error(const ProcessOutput& output, const std::string& command, const std::string& warning,
                                  const std::string& error) {
