@@ -28,7 +28,7 @@ uint64_t physical_memory_bytes() {
 }
 
 /// The largest error per pixel that the frame may have.
-size_t find_worst_frame(const std::vector<ErrorMetrics>& frames) {
+size_t find_worst_frame(const std::vector<NoisyErrors>& frames) {
   const auto size = [](const ErrorMetrics& errors) {
     return errors.color_rms[0].value.value_or(errors.color_rms[0].high);
   };

@@ -15,8 +15,6 @@ namespace {
 constexpr size_t kBase = 1;
 constexpr double kScatter = 0.05;  ///< what CPU times of the same work differ by
 
-double ratio(double a, double b) { return b > 0 ? a / b : 0.0; }
-
 /// A wish that is a number which should be small.
 struct Wish {
   std::string name, what;
@@ -26,7 +24,7 @@ struct Wish {
 
 std::vector<Wish> wishes() {
   return {{"less noise", "noise at equal CPU time", [](const TradeSummary& s) { return s.noise; },
-           [](const TradeSummary& s) { return fmt::format("{:.2f} of full detail's variance", s.noise); }},
+           [](const TradeSummary& s) { return fmt::format("{:.2f}", s.noise); }},
           {"less memory", "memory", [](const TradeSummary& s) { return static_cast<double>(s.memory_bytes); },
            [](const TradeSummary& s) { return format_bytes(s.memory_bytes); }},
           {"faster", "CPU time", [](const TradeSummary& s) { return s.cpu_seconds; },
@@ -40,7 +38,8 @@ std::string price_text(const Wish& wish, const TradeSummary& base, const TradeSu
                   is_yardstick ? "none (it is the yardstick)" : size_text(chosen.error), size_text(base.error));
   for (const Wish& other : wishes())
     if (other.name != wish.name)
-      text += fmt::format(", {} {:.2f} of the base's", other.what, ratio(other.figure(chosen), other.figure(base)));
+      text +=
+          fmt::format(", {} {:.2f} of the base's", other.what, ratio_or_zero(other.figure(chosen), other.figure(base)));
   return text + ".";
 }
 
@@ -62,7 +61,7 @@ size_t best_row(const Wish& wish, const std::vector<TradeSummary>& rows) {
 TradeAdvice advice_for(const Wish& wish, const Trade& trade, const std::vector<TradeSummary>& rows) {
   const TradeSummary& base = rows[kBase];
   const size_t row = best_row(wish, rows);
-  const double share = ratio(wish.figure(rows[row]), wish.figure(base));
+  const double share = ratio_or_zero(wish.figure(rows[row]), wish.figure(base));
   if (row == kBase || share > 1 - kScatter)
     return {wish.name, std::nullopt,
             fmt::format("Stay at the base ({}): nothing that was tried has less {} by more than {:.0f} %.",
@@ -80,7 +79,7 @@ TradeAdvice advice_for_closeness(const Trade& trade, const std::vector<TradeSumm
     if (rows[i].error.high < std::min(base.error.low, rows[chosen].error.high)) chosen = i;
   const std::string yardstick =
       fmt::format(" Full detail itself takes {} and {:.2f} of the base's CPU time.", format_bytes(rows[0].memory_bytes),
-                  ratio(rows[0].cpu_seconds, base.cpu_seconds));
+                  ratio_or_zero(rows[0].cpu_seconds, base.cpu_seconds));
   if (chosen == kBase)
     return {closer.name, std::nullopt,
             fmt::format("Stay at the base ({}; {}): nothing that was tried is surely closer with these samples.{}",
@@ -92,17 +91,23 @@ TradeAdvice advice_for_closeness(const Trade& trade, const std::vector<TradeSumm
 
 }  // namespace
 
+double cpu_ratio(const Trade& trade, size_t row, size_t light) {
+  return ratio_or_zero(trade.rows[row].lights[light].cost.cpu_seconds,
+                       trade.full_detail().lights[light].cost.cpu_seconds);
+}
+
 double noise_at_equal_time(const Trade& trade, size_t row, size_t light) {
-  const TradeUnderLight& figures = trade.rows[row].lights[light];
-  return ratio(figures.errors.variance * figures.cost.cpu_seconds,
-               figures.errors.full_variance * trade.full_detail().lights[light].cost.cpu_seconds);
+  return trade.rows[row].lights[light].errors.all.variance_ratio() * cpu_ratio(trade, row, light);
 }
 
 TimeRatio time_to_equal_error(const Trade& trade, size_t row, size_t light) {
-  const TradeUnderLight& figures = trade.rows[row].lights[light];
-  const double time = ratio(figures.cost.cpu_seconds, trade.full_detail().lights[light].cost.cpu_seconds);
-  return time_to_equal_error(time, figures.errors.variance, figures.errors.full_variance,
-                             figures.errors.all.color_rms[0]);
+  return time_to_equal_error(cpu_ratio(trade, row, light), trade.rows[row].lights[light].errors.all);
+}
+
+TimeRatio time_to_equal_error(const Trade& trade, size_t row, size_t light, size_t frame) {
+  const TradeUnderLight &figures = trade.rows[row].lights[light], &full = trade.full_detail().lights[light];
+  return time_to_equal_error(ratio_or_zero(figures.cost.frame_cpu_seconds[frame], full.cost.frame_cpu_seconds[frame]),
+                             figures.errors.frames[frame]);
 }
 
 TradeSummary summary_of(const Trade& trade, size_t row) {

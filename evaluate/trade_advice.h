@@ -19,10 +19,12 @@ struct TradeSummary {
 };
 TradeSummary summary_of(const Trade& trade, size_t row);
 
-/// A light's variance times CPU time over full detail's, 0 if full detail has no noise.
+/// A row's figures under one light over full detail's: CPU time; variance times CPU time, 0 if full detail has no
+/// noise; time to full detail's error, of the shot and of the frame of an index.
+double cpu_ratio(const Trade& trade, size_t row, size_t light);
 double noise_at_equal_time(const Trade& trade, size_t row, size_t light);
-/// A light's time to full detail's error over full detail's time.
 TimeRatio time_to_equal_error(const Trade& trade, size_t row, size_t light);
+TimeRatio time_to_equal_error(const Trade& trade, size_t row, size_t light, size_t frame);
 
 struct TradeAdvice {
   std::string wish;           ///< "less noise", "less memory", "faster", "closer"

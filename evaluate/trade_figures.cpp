@@ -31,6 +31,11 @@ double relative_variance(const ViewSums& sums, double ChannelSum::*variance) {
   return light > 0 ? noise * values / (light * light) : 0.0;
 }
 
+NoisyErrors errors_of(const ViewSums& sums) {
+  return {metrics_of(sums), relative_variance(sums, &ChannelSum::level_variance),
+          relative_variance(sums, &ChannelSum::source_variance)};
+}
+
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
   std::ranges::sort(values);
@@ -73,15 +78,12 @@ void hide_background(std::span<Image> source, std::span<Image> level) {
 Result<void> TradeErrorSums::add_frame(FrameParts full, FrameParts setting) {
   hide_background(full, setting);
   FARFIELD_TRY_LET(const auto sums, sum_view(full, setting));
-  frames_.push_back(metrics_of(sums));
+  frames_.push_back(errors_of(sums));
   sums_ += sums;
   return {};
 }
 
-TradeErrors TradeErrorSums::errors() const {
-  return {metrics_of(sums_), frames_, relative_variance(sums_, &ChannelSum::level_variance),
-          relative_variance(sums_, &ChannelSum::source_variance)};
-}
+TradeErrors TradeErrorSums::errors() const { return {errors_of(sums_), frames_}; }
 
 Result<Bounded> change_between(FrameParts a, FrameParts b) {
   hide_background(a, b);
@@ -124,16 +126,17 @@ TradeCost cost_of(std::span<const RenderReport> parts, std::span<const int> fram
   return cost;
 }
 
-TimeRatio time_to_equal_error(double time, double variance, double full_variance, const Bounded& error) {
+TimeRatio time_to_equal_error(double cpu_ratio, const NoisyErrors& errors) {
+  if (!(errors.full_variance > 0)) return {std::nullopt, 0, kInfinity};  // no noise to be equal to
   // Full detail's squared error at n samples is v / n; the setting's is e^2 + v' / n'. They are equal for
   // n' / n = v' / (v - e^2), n = 1 being the samples that were rendered.
-  if (!(full_variance > 0)) return {std::nullopt, 0, kInfinity};  // no noise to be equal to
-  const auto ratio = [&](double own_error) {
-    const double left_for_noise = full_variance - own_error * own_error;
-    return left_for_noise > 0 ? time * variance / left_for_noise : kInfinity;
+  const auto time = [&](double own_error) {
+    const double left_for_noise = errors.full_variance - own_error * own_error;
+    return left_for_noise > 0 ? cpu_ratio * errors.variance / left_for_noise : kInfinity;
   };
-  TimeRatio result{std::nullopt, ratio(error.low), ratio(error.high)};
-  if (error.value) result.value = ratio(*error.value);
+  const Bounded& error = errors.color_rms[0];
+  TimeRatio result{std::nullopt, time(error.low), time(error.high)};
+  if (error.value) result.value = time(*error.value);
   return result;
 }
 

@@ -19,13 +19,22 @@ using FrameParts = std::vector<Image>;
 /// Sets to 0 what none of the pictures touches: the sky is right at any setting, and its light is no yardstick.
 void hide_background(std::span<Image> source, std::span<Image> level);
 
+/// a / b; 0 where b is: what took no time, or had no noise, is no yardstick.
+inline double ratio_or_zero(double a, double b) { return b > 0 ? a / b : 0.0; }
+
+/// How far a setting is from full detail, and how noisy both are.
+struct NoisyErrors : ErrorMetrics {
+  /// Of one picture at the samples that were rendered: the mean over touched pixels and R, G, B, over the square of
+  /// full detail's mean there.
+  double variance = 0, full_variance = 0;
+
+  double variance_ratio() const { return ratio_or_zero(variance, full_variance); }
+};
+
 /// A shot at one setting against the same at full detail.
 struct TradeErrors {
-  ErrorMetrics all;                  ///< over all frames
-  std::vector<ErrorMetrics> frames;  ///< each alone
-  /// Variance of one picture at the samples that were rendered: the mean over touched pixels and R, G, B, over the
-  /// square of full detail's mean there.
-  double variance = 0, full_variance = 0;
+  NoisyErrors all;                  ///< over all frames
+  std::vector<NoisyErrors> frames;  ///< each alone
 };
 
 /// Adds frame by frame.
@@ -37,7 +46,7 @@ class TradeErrorSums {
 
  private:
   ViewSums sums_;
-  std::vector<ErrorMetrics> frames_;
+  std::vector<NoisyErrors> frames_;
 };
 
 /// sum |b - a| / sum a of two frames of one setting, noise taken out. Errors: those of sum_view.
@@ -70,7 +79,7 @@ struct TimeRatio {
   std::optional<double> value;  ///< absent where the setting's error is unknown
   double low = 0, high = 0;
 };
-/// time: CPU time over full detail's at equal samples; error: the setting's own, in the unit of the variances' roots.
-TimeRatio time_to_equal_error(double time, double variance, double full_variance, const Bounded& error);
+/// cpu_ratio: CPU time over full detail's at equal samples.
+TimeRatio time_to_equal_error(double cpu_ratio, const NoisyErrors& errors);
 
 }  // namespace farfield

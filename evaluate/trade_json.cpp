@@ -11,14 +11,30 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-double ratio(double a, double b) { return b > 0 ? a / b : 0.0; }
+/// "time_to_equal_error": null with "reaches_equal_error" false where no number of samples does, and with null there,
+/// too, where that is unknown.
+void put_time_to_equal_error(Json& json, const TimeRatio& time) {
+  const bool is_known = time.value.has_value(), is_finite = is_known && std::isfinite(*time.value);
+  json["time_to_equal_error"] = is_finite ? Json(*time.value) : Json();
+  json["reaches_equal_error"] = is_known ? Json(is_finite) : Json();
+  json["bounds"]["time_to_equal_error"] = {time.low, time.high};
+}
 
-Json frames_json(const Trade& trade, const TradeUnderLight& figures) {
+void put_noise(Json& json, const NoisyErrors& errors) {
+  json["variance"] = errors.variance;
+  json["variance_ratio"] = errors.variance_ratio();
+}
+
+Json frames_json(const Trade& trade, size_t row, size_t light) {
+  const TradeUnderLight& figures = trade.rows[row].lights[light];
   Json frames = Json::array();
   for (size_t i = 0; i < figures.errors.frames.size(); ++i) {
-    FiguresJson frame(Json{{"frame", trade.frames[i]}, {"cpu_seconds", figures.cost.frame_cpu_seconds[i]}});
-    frame.put_color(figures.errors.frames[i]);
-    frames.push_back(std::move(frame).finish());
+    FiguresJson errors(Json{{"frame", trade.frames[i]}, {"cpu_seconds", figures.cost.frame_cpu_seconds[i]}});
+    errors.put_color(figures.errors.frames[i]);
+    Json frame = std::move(errors).finish();
+    put_noise(frame, figures.errors.frames[i]);
+    put_time_to_equal_error(frame, time_to_equal_error(trade, row, light, i));
+    frames.push_back(std::move(frame));
   }
   return frames;
 }
@@ -34,27 +50,17 @@ Json changes_json(const Trade& trade, const TradeUnderLight& figures) {
   return changes;
 }
 
-/// "time_to_equal_error": null with "reaches_equal_error" false where no number of samples does, and with null there,
-/// too, where that is unknown.
-void put_time_to_equal_error(Json& json, const TimeRatio& time) {
-  const bool is_known = time.value.has_value(), is_finite = is_known && std::isfinite(*time.value);
-  json["time_to_equal_error"] = is_finite ? Json(*time.value) : Json();
-  json["reaches_equal_error"] = is_known ? Json(is_finite) : Json();
-  json["bounds"]["time_to_equal_error"] = {time.low, time.high};
-}
-
 Json light_json(const Trade& trade, size_t row, size_t light) {
   const TradeUnderLight& figures = trade.rows[row].lights[light];
-  const TradeCost &cost = figures.cost, &full = trade.full_detail().lights[light].cost;
+  const TradeCost& cost = figures.cost;
   FiguresJson errors(Json{{"light", name_of(figures.light)}});
   errors.put_color(figures.errors.all);
   if (!figures.pop.all.empty()) errors.put("pop", figures.pop.most);
   Json json = std::move(errors).finish();
   if (!figures.pop.all.empty()) json["pop_between"] = figures.pop.at;
-  json["variance"] = figures.errors.variance;
-  json["variance_ratio"] = ratio(figures.errors.variance, figures.errors.full_variance);
+  put_noise(json, figures.errors.all);
   json["cpu_seconds"] = cost.cpu_seconds;
-  json["cpu_ratio"] = ratio(cost.cpu_seconds, full.cpu_seconds);
+  json["cpu_ratio"] = cpu_ratio(trade, row, light);
   json["noise_at_equal_time"] = noise_at_equal_time(trade, row, light);
   put_time_to_equal_error(json, time_to_equal_error(trade, row, light));
   json["seconds"] = cost.seconds;
@@ -62,7 +68,7 @@ Json light_json(const Trade& trade, size_t row, size_t light) {
   json["rays"] = cost.rays;
   json["peak_accounted_bytes"] = cost.peak_accounted_bytes;
   json["peak_rss_bytes"] = cost.peak_rss_bytes;
-  json["frames"] = frames_json(trade, figures);
+  json["frames"] = frames_json(trade, row, light);
   json["changes"] = changes_json(trade, figures);
   return json;
 }

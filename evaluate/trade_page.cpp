@@ -92,17 +92,16 @@ std::string cells(const std::vector<std::string>& texts, std::string_view elemen
 
 std::vector<std::string> row_texts(const Trade& trade, size_t row, size_t light) {
   const TradeUnderLight& figures = trade.rows[row].lights[light];
-  const TradeCost &cost = figures.cost, &full = trade.full_detail().lights[light].cost;
-  const auto ratio = [](double a, double b) { return b > 0 ? a / b : 0.0; };
-  const double loading = ratio(cost.load_seconds, cost.seconds);
+  const TradeCost& cost = figures.cost;
+  const double loading = ratio_or_zero(cost.load_seconds, cost.seconds);
   std::vector<std::string> texts = {label_of(trade, row)};
   if (row == 0)
     texts.insert(texts.end(), {"yardstick", "yardstick"});
   else
     texts.insert(texts.end(), {size_text(figures.errors.all.color_rms[0]), bias_text(figures.errors.all.color_bias)});
   texts.insert(texts.end(),
-               {times_text(ratio(figures.errors.variance, figures.errors.full_variance)),
-                fmt::format("{:.2f} ({:.2f} s)", ratio(cost.cpu_seconds, full.cpu_seconds), cost.cpu_seconds),
+               {times_text(figures.errors.all.variance_ratio()),
+                fmt::format("{:.2f} ({:.2f} s)", cpu_ratio(trade, row, light), cost.cpu_seconds),
                 times_text(noise_at_equal_time(trade, row, light)), time_text(time_to_equal_error(trade, row, light)),
                 format_bytes(cost.peak_accounted_bytes), format_bytes(cost.peak_rss_bytes),
                 fmt::format("{:.1f} %", 100 * loading), row == 0 ? "yardstick" : pop_text(figures.pop)});
@@ -135,7 +134,7 @@ std::string legend_html() {
          "as large as full detail's noise at these samples; never, where the own error alone is larger. Loading is "
          "summed over loads, some beside rays: at least what rays wait. Shot pop: how much more, at the most, one "
          "frame differs from the next than at full detail, in shares of the light; it is of levels only where frames "
-         "are close together. Plots leave out what is unknown.</p>\n";
+         "are close together. Plots leave out what is unknown, or never.</p>\n";
 }
 
 // ---- plots ----
@@ -148,7 +147,7 @@ PlotSeries error_over_time(const Trade& trade, size_t row, size_t light) {
   PlotSeries series{label_of(trade, row), row, {}, row == 0, true, false};
   for (int step = 0; step <= kSteps; ++step) {
     const double samples = std::exp2(-4.0 + 12.0 * step / kSteps);  // of those that were rendered
-    const double error = std::sqrt(own * own + figures.errors.variance / samples);
+    const double error = std::sqrt(own * own + figures.errors.all.variance / samples);
     series.points.push_back({samples * figures.cost.cpu_seconds, 100 * error});
   }
   return series;
@@ -156,13 +155,15 @@ PlotSeries error_over_time(const Trade& trade, size_t row, size_t light) {
 
 using Points = std::vector<std::array<double, 2>>;
 
-Points error_over_memory(const Trade&, const TradeUnderLight& figures) {
+Points error_over_memory(const Trade& trade, size_t row, size_t light) {
+  const TradeUnderLight& figures = trade.rows[row].lights[light];
   const Bounded& error = figures.errors.all.color_rms[0];
   if (!error.value) return {};
   return {{static_cast<double>(figures.cost.peak_accounted_bytes) / (1 << 20), 100 * *error.value}};
 }
 
-Points error_of_frames(const Trade& trade, const TradeUnderLight& figures) {
+Points error_of_frames(const Trade& trade, size_t row, size_t light) {
+  const TradeUnderLight& figures = trade.rows[row].lights[light];
   Points points;
   for (size_t i = 0; i < trade.frames.size(); ++i)
     if (const auto& error = figures.errors.frames[i].color_rms[0]; error.value)
@@ -170,14 +171,24 @@ Points error_of_frames(const Trade& trade, const TradeUnderLight& figures) {
   return points;
 }
 
-Points time_of_frames(const Trade& trade, const TradeUnderLight& figures) {
+Points time_of_frames(const Trade& trade, size_t row, size_t light) {
+  const TradeUnderLight& figures = trade.rows[row].lights[light];
   Points points;
   for (size_t i = 0; i < trade.frames.size(); ++i)
     points.push_back({static_cast<double>(trade.frames[i]), figures.cost.frame_cpu_seconds[i]});
   return points;
 }
 
-Points change_of_frames(const Trade& trade, const TradeUnderLight& figures) {
+Points equal_error_of_frames(const Trade& trade, size_t row, size_t light) {
+  Points points;
+  for (size_t i = 0; i < trade.frames.size(); ++i)
+    if (const TimeRatio time = time_to_equal_error(trade, row, light, i); time.value)
+      points.push_back({static_cast<double>(trade.frames[i]), *time.value});
+  return points;
+}
+
+Points change_of_frames(const Trade& trade, size_t row, size_t light) {
+  const TradeUnderLight& figures = trade.rows[row].lights[light];
   Points points;
   for (size_t i = 0; i < figures.changes.size(); ++i)
     if (const auto& change = figures.changes[i]; change.value)
@@ -187,10 +198,9 @@ Points change_of_frames(const Trade& trade, const TradeUnderLight& figures) {
 
 /// A plot with a series for each setting. What is unknown is not in it.
 std::string plot_of(const Trade& trade, size_t light, Plot plot,
-                    Points (*points)(const Trade& trade, const TradeUnderLight& figures)) {
+                    Points (*points)(const Trade& trade, size_t row, size_t light)) {
   for (size_t row = 0; row < trade.rows.size(); ++row)
-    plot.series.push_back(
-        {label_of(trade, row), row, points(trade, trade.rows[row].lights[light]), row == 0, true, true});
+    plot.series.push_back({label_of(trade, row), row, points(trade, row, light), row == 0, true, true});
   return svg_of(plot);
 }
 
@@ -204,6 +214,8 @@ std::string plots_of(const Trade& trade, size_t light) {
   html +=
       plot_of(trade, light, {"Error of each frame", "frame", "error per pixel, %", false, false, {}}, error_of_frames);
   html += plot_of(trade, light, {"CPU time of each frame", "frame", "CPU s", false, false, {}}, time_of_frames);
+  html += plot_of(trade, light, {"Time to equal error in each frame", "frame", "of full detail's", false, true, {}},
+                  equal_error_of_frames);
   if (trade.frames.size() > 1)
     html += plot_of(trade, light, {"Change from frame to frame", "frame", "of the light, %", false, false, {}},
                     change_of_frames);

@@ -20,8 +20,8 @@ inline Trade sample_trade() {
     TradeUnderLight figures;
     figures.errors.all.color_rms[0] = {errors[i], 0.9 * errors[i], 1.1 * errors[i], 0.02 * errors[i]};
     figures.errors.all.color_bias = {Estimate{-errors[i] / 4, 0.001}, Estimate{0, 0.001}, Estimate{0.003, 0.001}};
+    figures.errors.all.variance = figures.errors.all.full_variance = 0.01;
     figures.errors.frames.assign(2, figures.errors.all);
-    figures.errors.variance = figures.errors.full_variance = 0.01;
     figures.cost = {seconds[i], seconds[i] / 2, 0.1, 1e6, memory[i], memory[i] + 1, {seconds[i] / 2, seconds[i] / 2}};
     figures.changes = {{0.5 + errors[i], 0.4, 0.6, 0.01}};
     figures.pop = {{errors[i], -0.1, 0.2, 0.01}, {0, 10}, {{errors[i], -0.1, 0.2, 0.01}}};

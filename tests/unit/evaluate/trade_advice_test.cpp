@@ -59,10 +59,19 @@ TEST(TradeAdvice, OfEquallyGoodSettingsIsTheClosestOne) {
   EXPECT_EQ(find(advise(trade), "less memory").row, 2u);
 }
 
+TEST(TimeToEqualError, OfAFrameIsByItsOwnTimeAndError) {
+  Trade trade = test::sample_trade();
+  TradeUnderLight& figures = trade.rows[1].lights[0];
+  figures.cost.frame_cpu_seconds = {4, 1};  // full detail takes 5 in each
+  figures.errors.frames[1].color_rms[0] = {0.0, 0, 0, 0};
+  EXPECT_NEAR(time_to_equal_error(trade, 1, 0, 1).value.value(), 1.0 / 5, 1e-12);
+  EXPECT_NEAR(time_to_equal_error(trade, 1, 0, 0).value.value(), 4.0 / 5 * 0.01 / (0.01 - 0.04 * 0.04), 1e-12);
+}
+
 TEST(TradeSummary, IsOfTheWorstLight) {
   Trade trade = test::sample_trade();
   trade.rows[1].lights[1].errors.all.color_rms[0] = {0.3, 0.2, 0.4, 0};
-  trade.rows[1].lights[1].errors.variance = 0.05;
+  trade.rows[1].lights[1].errors.all.variance = 0.05;
   const TradeSummary summary = summary_of(trade, 1);
   EXPECT_EQ(summary.error.value.value(), 0.3);
   EXPECT_EQ(summary.cpu_seconds, 16);

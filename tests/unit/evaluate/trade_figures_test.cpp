@@ -69,8 +69,8 @@ TEST(TradeErrors, NoiseThatPartsShareDoesNotBlurTheBias) {
 TEST(TradeErrors, VarianceIsThatOfOnePictureOverTheSquaredLight) {
   const TradeErrors errors = errors_of(test::noisy_parts(grey(0.5f), 0.1f, 6), test::noisy_parts(grey(0.6f), 0.05f, 7));
   // noisy_parts gives the mean of four: one has twice the deviation. 2 % is three standard errors of so many pixels.
-  EXPECT_NEAR(errors.full_variance, 0.2 * 0.2 / 0.25, 0.02 * 0.16);
-  EXPECT_NEAR(errors.variance, 0.1 * 0.1 / 0.25, 0.02 * 0.04);
+  EXPECT_NEAR(errors.all.full_variance, 0.2 * 0.2 / 0.25, 0.02 * 0.16);
+  EXPECT_NEAR(errors.all.variance, 0.1 * 0.1 / 0.25, 0.02 * 0.04);
 }
 
 TEST(TradeErrors, FramesAreKeptApartAndJoined) {
@@ -185,12 +185,19 @@ TEST(TradeCost, IsTheSumOverFramesOfMediansOverParts) {
   EXPECT_EQ(even.cpu_seconds, 8);
 }
 
+NoisyErrors noisy(double variance, double full_variance, const Bounded& error) {
+  NoisyErrors errors;
+  errors.variance = variance, errors.full_variance = full_variance;
+  errors.color_rms[0] = error;
+  return errors;
+}
+
 TEST(TimeToEqualError, IsTheTimeWhenNoiseAndOwnErrorTogetherAreFullDetailsNoise) {
   // Without an error of its own: as the product of time and variance.
   const Bounded none{0.0, 0, 0, 0};
-  EXPECT_NEAR(time_to_equal_error(0.5, 0.02, 0.04, none).value.value(), 0.25, 1e-12);
+  EXPECT_NEAR(time_to_equal_error(0.5, noisy(0.02, 0.04, none)).value.value(), 0.25, 1e-12);
   // 0.1^2 of 0.04 is the error: 0.03 are left for noise.
-  const TimeRatio time = time_to_equal_error(0.5, 0.02, 0.04, {0.1, 0.05, 0.15, 0});
+  const TimeRatio time = time_to_equal_error(0.5, noisy(0.02, 0.04, {0.1, 0.05, 0.15, 0}));
   const double samples = time.value.value() / 0.5;
   EXPECT_NEAR(0.1 * 0.1 + 0.02 / samples, 0.04, 1e-12);
   EXPECT_LT(time.low, *time.value);
@@ -198,12 +205,12 @@ TEST(TimeToEqualError, IsTheTimeWhenNoiseAndOwnErrorTogetherAreFullDetailsNoise)
 }
 
 TEST(TimeToEqualError, IsInfiniteWhereTheErrorIsLargerThanTheNoiseAndUnknownWhereTheErrorIs) {
-  EXPECT_EQ(time_to_equal_error(0.5, 0.02, 0.04, {0.2, 0.19, 0.21, 0}).value.value(), kInfinity);
-  const TimeRatio unknown = time_to_equal_error(0.5, 0.02, 0.04, {std::nullopt, 0, 0.3, 0});
+  EXPECT_EQ(time_to_equal_error(0.5, noisy(0.02, 0.04, {0.2, 0.19, 0.21, 0})).value.value(), kInfinity);
+  const TimeRatio unknown = time_to_equal_error(0.5, noisy(0.02, 0.04, {std::nullopt, 0, 0.3, 0}));
   EXPECT_FALSE(unknown.value);
   EXPECT_NEAR(unknown.low, 0.25, 1e-12);
   EXPECT_EQ(unknown.high, kInfinity);
-  EXPECT_FALSE(time_to_equal_error(0.5, 0, 0, {0.0, 0, 0, 0}).value) << "without noise there is no such time";
+  EXPECT_FALSE(time_to_equal_error(0.5, noisy(0, 0, {0.0, 0, 0, 0})).value) << "without noise there is no such time";
 }
 
 }  // namespace

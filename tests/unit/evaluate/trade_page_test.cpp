@@ -36,7 +36,9 @@ TEST(TradeJson, HasEverySettingUnderEveryLight) {
             "cpu_seconds", "cpu_ratio", "noise_at_equal_time", "time_to_equal_error", "seconds", "load_seconds",
             "peak_accounted_bytes", "peak_rss_bytes", "pop", "changes"})
         EXPECT_TRUE(light.contains(key)) << key;
-      EXPECT_EQ(light["frames"].size(), 2u);
+      ASSERT_EQ(light["frames"].size(), 2u);
+      for (const char* key : {"cpu_seconds", "color_rms", "variance", "variance_ratio", "time_to_equal_error"})
+        EXPECT_TRUE(light["frames"][0].contains(key)) << key;
       EXPECT_EQ(light["frames"][1]["frame"], 10);
     }
   }
