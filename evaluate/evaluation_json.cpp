@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluate/evaluation_json.h"
 
-#include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
+
+#include "evaluate/figures_json.h"
 
 namespace farfield {
 namespace {
@@ -11,59 +11,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json vector_json(const vec3& v) { return {v.x, v.y, v.z}; }
-
-/// An object of figures. Beside them stand "standard_errors" and, for what may be unknown, "bounds" by the same names.
-class Figures {
- public:
-  explicit Figures(Json json) : json_(std::move(json)) {}
-
-  void put(const std::string& name, const Estimate& estimate) {
-    json_[name] = estimate.value;
-    standard_errors_[name] = estimate.standard_error;
-  }
-  void put(const std::string& name, const std::array<Estimate, 3>& rgb) {
-    json_[name] = {rgb[0].value, rgb[1].value, rgb[2].value};
-    standard_errors_[name] = {rgb[0].standard_error, rgb[1].standard_error, rgb[2].standard_error};
-  }
-  void put(const std::string& name, const Bounded& size) {
-    json_[name] = size.value ? Json(*size.value) : Json();
-    bounds_[name] = {size.low, size.high};
-    standard_errors_[name] = size.value ? Json(size.standard_error) : Json();
-  }
-  /// One name per side of kBlockSides: "color_rms", "color_rms_2x2", "color_rms_4x4".
-  void put(const std::string& name, const std::array<Bounded, kBlockSides.size()>& sizes) {
-    for (size_t i = 0; i < kBlockSides.size(); ++i)
-      put(kBlockSides[i] == 1 ? name : fmt::format("{}_{}x{}", name, kBlockSides[i], kBlockSides[i]), sizes[i]);
-  }
-  void put(const std::string& name, const DepthFigures& depth) {
-    put(name + "_mean", depth.mean);
-    put(name + "_distance", depth.distance);
-  }
-
-  Json finish() && {
-    if (!bounds_.empty()) json_["bounds"] = std::move(bounds_);
-    json_["standard_errors"] = std::move(standard_errors_);
-    return std::move(json_);
-  }
-
- private:
-  Json json_;
-  Json bounds_ = Json::object(), standard_errors_ = Json::object();
-};
-
-void put_occlusion(Figures& figures, const ErrorMetrics& e) {
-  figures.put("occlusion_error", e.occlusion_error);
-  figures.put("occlusion_rms", e.occlusion_rms);
-  figures.put("occlusion_rms_touched", e.occlusion_rms_touched);
-}
-
-void put_color(Figures& figures, const ErrorMetrics& e) {
-  figures.put("color_error", e.color_error);
-  figures.put("color_bias", e.color_bias);
-  figures.put("color_bias_mean", e.color_bias_mean);
-  figures.put("color_rest", e.color_rest);
-  figures.put("color_rms", e.color_rms);
-}
 
 Json color_noise_json(const ErrorMetrics& e) {
   return {{"color_error_raw", e.color_error_raw},
@@ -82,7 +29,7 @@ Json view_json(const std::vector<vec3>& directions, size_t view) {
 Json views_json(const std::vector<ErrorMetrics>& views, const std::vector<vec3>& directions) {
   Json json = Json::array();
   for (size_t i = 0; i < views.size(); ++i) {
-    Figures figures(view_json(directions, i));
+    FiguresJson figures(view_json(directions, i));
     figures.put("occlusion_error", views[i].occlusion_error);
     figures.put("color_bias", views[i].color_bias);
     figures.put("color_error", views[i].color_error);
@@ -94,22 +41,22 @@ Json views_json(const std::vector<ErrorMetrics>& views, const std::vector<vec3>&
 
 Json worst_color_json(const LightEvaluation& light, const std::vector<vec3>& directions) {
   if (light.worst_view >= light.views.size()) return {};
-  Figures figures(view_json(directions, light.worst_view));
+  FiguresJson figures(view_json(directions, light.worst_view));
   figures.put("color_bias", light.views[light.worst_view].color_bias);
   return std::move(figures).finish();
 }
 
 Json worst_coverage_json(const LevelEvaluation& level, const std::vector<vec3>& directions) {
   if (level.worst_view >= level.views.size()) return {};
-  Figures figures(view_json(directions, level.worst_view));
+  FiguresJson figures(view_json(directions, level.worst_view));
   figures.put("occlusion_error", level.views[level.worst_view].occlusion_error);
   return std::move(figures).finish();
 }
 
 Json light_json(const LightEvaluation& light, const std::vector<vec3>& directions) {
-  Figures figures(Json{{"light", name_of(light.light)}});
-  put_occlusion(figures, light.errors);
-  put_color(figures, light.errors);
+  FiguresJson figures(Json{{"light", name_of(light.light)}});
+  figures.put_occlusion(light.errors);
+  figures.put_color(light.errors);
   Json json = std::move(figures).finish();
   json.update(color_noise_json(light.errors));
   json["worst_view"] = worst_color_json(light, directions);
@@ -118,7 +65,7 @@ Json light_json(const LightEvaluation& light, const std::vector<vec3>& direction
 }
 
 Json depth_json(const DepthAgreement& depth) {
-  Figures figures(Json::object());
+  FiguresJson figures(Json::object());
   figures.put("camera", depth.camera);
   figures.put("inside", depth.inside);
   figures.put("inside_hits", depth.inside_hits);
@@ -126,15 +73,15 @@ Json depth_json(const DepthAgreement& depth) {
 }
 
 Json level_json(const LevelEvaluation& level, const std::vector<vec3>& directions) {
-  Figures figures(Json{{"level", level.entry.level},
-                       {"grid", level.entry.grid},
-                       {"resolution", level.entry.resolution},
-                       {"triangles", level.entry.triangles},
-                       {"voxels", level.entry.voxels},
-                       {"bytes_disk", level.entry.file_bytes},
-                       {"bytes_resident", level.entry.resident_bytes}});
-  put_occlusion(figures, level.errors);
-  if (level.has_daylight()) put_color(figures, level.errors);
+  FiguresJson figures(Json{{"level", level.entry.level},
+                           {"grid", level.entry.grid},
+                           {"resolution", level.entry.resolution},
+                           {"triangles", level.entry.triangles},
+                           {"voxels", level.entry.voxels},
+                           {"bytes_disk", level.entry.file_bytes},
+                           {"bytes_resident", level.entry.resident_bytes}});
+  figures.put_occlusion(level.errors);
+  if (level.has_daylight()) figures.put_color(level.errors);
   Json json = std::move(figures).finish();
   if (level.has_daylight()) json.update(color_noise_json(level.errors));
   json["worst_view"] = worst_coverage_json(level, directions);

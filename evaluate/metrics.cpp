@@ -19,11 +19,11 @@ double ratio(double numerator, double denominator) {
   return numerator == 0 ? 0.0 : std::copysign(std::numeric_limits<double>::infinity(), numerator);
 }
 
-/// (level - source) / source of independent sums.
+/// (level - source) / source.
 Estimate relative_error(const ChannelSum& channel) {
   const double error = ratio(channel.level - channel.source, channel.source);
   const double gain = ratio(channel.level, channel.source);
-  return {error, ratio(std::sqrt(channel.level_variance + gain * gain * channel.source_variance), channel.source)};
+  return {error, ratio(std::sqrt(channel.variance_of_difference(gain)), channel.source)};
 }
 
 /// The mean square of blocks, in units of `unit` squared. Noise of noise can leave a variance below 0.
@@ -38,7 +38,7 @@ Estimate bias_mean(const ViewSums& sums, double light) {
   for (size_t c = 0; c < 3; ++c) {
     const ChannelSum& channel = sums.channels[c];
     difference += std::abs(channel.level - channel.source);
-    deviation += std::sqrt(channel.level_variance + channel.source_variance);  // the channels are noisy together
+    deviation += std::sqrt(channel.variance_of_difference());  // the channels are noisy together
   }
   return {ratio(difference, light), ratio(deviation, light)};
 }

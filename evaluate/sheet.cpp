@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "evaluate/difference_image.h"
 #include "evaluate/label.h"
 
 namespace farfield {
@@ -21,10 +22,6 @@ vec3 read_rgb(const Image& image, int x, int y) {
 void write_rgb(Image& image, int x, int y, const vec3& rgb) {
   for (int c = 0; c < 3; ++c) image.pixel(x, y)[c] = rgb[c];
 }
-
-/// sRGB without its linear toe: where differences are formed, as the eye sees them.
-vec3 to_display(const vec3& linear) { return glm::pow(glm::clamp(linear, 0.0f, 1.0f), vec3(1.0f / 2.2f)); }
-vec3 to_linear(const vec3& display) { return glm::pow(glm::clamp(display, 0.0f, 1.0f), vec3(2.2f)); }
 
 /// Exposure that puts the mean radiance of what is covered at a middle grey, the same for all rows.
 float common_exposure(std::span<const SheetRow> rows) {
@@ -49,16 +46,6 @@ Image compose(const Image& rgba, float exposure) {
     for (int x = 0; x < rgba.width; ++x) {
       const float alpha = rgba.pixel(x, y)[3];
       write_rgb(out, x, y, exposure * read_rgb(rgba, x, y) + kBackground * (1.0f - alpha));
-    }
-  return out;
-}
-
-Image difference(const Image& source, const Image& level) {
-  Image out(source.width, source.height, kRgb);
-  for (int y = 0; y < out.height; ++y)
-    for (int x = 0; x < out.width; ++x) {
-      const vec3 signed_difference = to_display(read_rgb(level, x, y)) - to_display(read_rgb(source, x, y));
-      write_rgb(out, x, y, to_linear(0.5f + 2.0f * signed_difference));
     }
   return out;
 }
@@ -102,7 +89,7 @@ Image make_sheet(std::span<const SheetRow> rows, int cell_px) {
   int y = header_px;
   for (const SheetRow& row : rows) {
     const Image source = compose(row.source, exposure), level = compose(row.level, exposure);
-    const Image cells[] = {source, level, difference(source, level)};
+    const Image cells[] = {source, level, difference_image(source, level)};
     for (int column = 0; column < 3; ++column)
       paste_centered(sheet, fit(cells[column], cell_px), kGap + column * (cell_px + kGap), y, cell_px);
     int text_y = y + cell_px + 2;

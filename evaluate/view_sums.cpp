@@ -20,13 +20,16 @@ double sum_of(const PartValues& values) {
   return sum;
 }
 
-/// Of the mean of the parts, as their spread shows it.
-double variance_of_mean(const PartValues& values) {
-  const double mean = sum_of(values) / kPartCount;
-  double squares = 0;
-  for (const double value : values) squares += (value - mean) * (value - mean);
-  return squares / (kPartCount * (kPartCount - 1.0));
+/// Of two means, as their parts show it in pairs.
+double covariance_of_means(const PartValues& a, const PartValues& b) {
+  const double mean_a = sum_of(a) / kPartCount, mean_b = sum_of(b) / kPartCount;
+  double products = 0;
+  for (size_t part = 0; part < kParts; ++part) products += (a[part] - mean_a) * (b[part] - mean_b);
+  return products / (kPartCount * (kPartCount - 1.0));
 }
+
+/// Of the mean of the parts, as their spread shows it.
+double variance_of_mean(const PartValues& values) { return covariance_of_means(values, values); }
 
 /// A combination of the parts with the noise of their mean and none of what they share.
 double noise_of(const PartValues& values) { return (values[0] - values[1] + values[2] - values[3]) / kPartCount; }
@@ -129,6 +132,7 @@ void add_channels(Parts source, Parts level, ViewSums& sums) {
     channel.level += sum_of(l) / kPartCount;
     channel.source_variance += variance_of_mean(s);
     channel.level_variance += variance_of_mean(l);
+    channel.covariance += covariance_of_means(s, l);
     const PartValues difference = difference_at(source, level, i);
     if (i % 4 == 3) {
       const double mean = sum_of(difference) / kPartCount;
@@ -200,6 +204,7 @@ ViewSums& ViewSums::operator+=(const ViewSums& other) {
     channels[c].level += other.channels[c].level;
     channels[c].source_variance += other.channels[c].source_variance;
     channels[c].level_variance += other.channels[c].level_variance;
+    channels[c].covariance += other.channels[c].covariance;
   }
   for (size_t i = 0; i < kBlockSides.size(); ++i) add(alpha[i], other.alpha[i]), add(color[i], other.color[i]);
   add(sides, other.sides);

@@ -3,6 +3,7 @@
 // Pure; any thread.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <span>
 
@@ -19,10 +20,16 @@ inline constexpr size_t kParts = 4;
 /// Pictures are compared after sums of n x n pixels.
 inline constexpr std::array<int, 3> kBlockSides = {1, 2, 4};
 
-/// A channel's values over all pixels, and the variance that noise gives these sums.
+/// A channel's values over all pixels, and the variance that noise gives these sums. Part i of the source and part i of
+/// the level may share their seed, and thus noise.
 struct ChannelSum {
   double source = 0, level = 0;
-  double source_variance = 0, level_variance = 0;
+  double source_variance = 0, level_variance = 0, covariance = 0;
+
+  /// Of level - gain * source.
+  double variance_of_difference(double gain = 1) const {
+    return std::max(0.0, level_variance + gain * gain * source_variance - 2 * gain * covariance);
+  }
 };
 
 /// Squared differences without noise, over blocks of pixels.

@@ -34,18 +34,12 @@ std::string scene_name(const fs::path& scene) {
   return name.stem().string();
 }
 
-// Not "/proc/self/exe" itself, so that the child has this program's name in `ps`.
-std::string this_program() {
-  std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  return error ? "/proc/self/exe" : program.string();
-}
-
 SceneBakeOptions scene_bake_options(const RenderOptions& options) {
   SceneBakeOptions bake;
   bake.scene = options.scene;
   bake.library = asset_library_folder(options);
   bake.finest_grid = options.finest_grid;
+  bake.rays_per_voxel = options.rays_per_voxel;
   bake.source_only = options.full_detail;
   bake.assemblies = options.assemblies;
   return bake;
@@ -60,6 +54,8 @@ std::vector<std::string> bake_command(const RenderOptions& options, const SceneB
                                       bake.library.string(),
                                       "--finest-grid",
                                       fmt::format("{}", bake.finest_grid),
+                                      "--rays-per-voxel",
+                                      fmt::format("{}", bake.rays_per_voxel),
                                       "--assemblies",
                                       name_of(bake.assemblies),
                                       "--threads",
@@ -109,10 +105,8 @@ Result<BakeNews> bake_in_a_process(const GltfScene& scene, const RenderOptions& 
                                                [&](std::string_view line) { news.read(line); }));
   if (WIFEXITED(status) && (WEXITSTATUS(status) == 0 || WEXITSTATUS(status) == kBakeFailed)) return news;
   if (options.job.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
-  const std::string how = WIFSIGNALED(status) ? fmt::format("signal {}", WTERMSIG(status))
-                                              : fmt::format("exit code {}", WEXITSTATUS(status));
   return make_error(ErrorCode::BadFile, fmt::format("{}: baking {} failed ({})", options.scene.string(),
-                                                    what_was_baked(scene, news.at), how));
+                                                    what_was_baked(scene, news.at), how_it_ended(status)));
 }
 
 }  // namespace

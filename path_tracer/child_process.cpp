@@ -11,6 +11,8 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
+#include <system_error>
 
 #include "base/file_io.h"
 #include "base/result.h"
@@ -86,6 +88,18 @@ void read_rest(int descriptor, LineBuffer& lines) {
 }
 
 }  // namespace
+
+std::string this_program() {
+  std::error_code error;
+  // Not "/proc/self/exe" itself, so that the child has this program's name in `ps`.
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
+  return error ? "/proc/self/exe" : program.string();
+}
+
+std::string how_it_ended(int status) {
+  return WIFSIGNALED(status) ? fmt::format("signal {}", WTERMSIG(status))
+                             : fmt::format("exit code {}", WEXITSTATUS(status));
+}
 
 Result<int> run_child(const std::vector<std::string>& command, const Job& job,
                       const std::function<void(std::string_view line)>& line) {

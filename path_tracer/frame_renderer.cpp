@@ -59,6 +59,7 @@ std::string make_fingerprint(const RenderOptions& options, std::span<const fs::p
       options.budget_bytes, options.pixel_error, static_cast<int>(options.blend), options.full_detail,
       options.exposure_stops, options.cryptomatte, options.camera, options.frames_per_second, identity(options.scene),
       identity(options.environment), options.sky);
+  if (options.turn_sun) text += " sun turned";  // said only then: shots from before know no other
   for (const fs::path& folder : asset_folders)
     if (!folder.empty()) text += fmt::format(" {}:{}", folder.filename().string(), to_hex(manifest_hash(folder)));
   return text;

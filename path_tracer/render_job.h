@@ -33,9 +33,12 @@ struct RenderOptions {
   bool full_detail = false;           ///< level 0 only, from assets baked with --source-only
   std::filesystem::path environment;  ///< EXR or Radiance HDR; empty: sun and sky, see make_lights()
   bool sky = true;                    ///< false: without an environment there is no light but the scene's own
-  float exposure_stops = 0;           ///< of the PNG previews
-  bool cryptomatte = false;           ///< also write ids of objects and materials, see film.h
-  uint32_t finest_grid = 512;         ///< of assets that have to be baked first
+  /// The sun, its sky and the scene's directional lights come from the opposite side: half a turn about +y.
+  bool turn_sun = false;
+  float exposure_stops = 0;                          ///< of the PNG previews
+  bool cryptomatte = false;                          ///< also write ids of objects and materials, see film.h
+  uint32_t finest_grid = 512;                        ///< of assets that have to be baked first
+  uint32_t rays_per_voxel = 200;                     ///< the same: SceneBakeOptions::rays_per_voxel
   AssemblyRule assemblies = AssemblyRule::Repeated;  ///< which subtrees of the scene are baked as one
   /// Command that bakes: called as BAKER bake SCENE --scene -o LIBRARY ... Empty: this very program.
   std::filesystem::path baker;
@@ -49,7 +52,8 @@ struct RenderOptions {
 struct FrameReport {
   int frame = 0;
   double seconds = 0;            ///< wall time of plan, prefetch and render
-  double load_seconds = 0;       ///< of it, summed over loads of levels: map, check, build
+  double cpu_seconds = 0;        ///< of all threads of the process meanwhile
+  double load_seconds = 0;       ///< summed over loads of levels: map, check, build
   uint64_t accounted_bytes = 0;  ///< that the runtime counts against the budget, after the frame
   uint64_t rss_bytes = 0;        ///< of the process after the frame
   uint64_t levels_loaded = 0;

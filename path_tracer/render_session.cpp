@@ -4,6 +4,7 @@
 #include <malloc.h>
 
 #include <chrono>
+#include <ctime>
 
 #include "base/process_memory.h"
 #include "base/result.h"
@@ -24,6 +25,13 @@ RuntimeOptions runtime_options(const RenderOptions& options) {
     if (sink) sink(text);
   };
   return runtime;
+}
+
+/// Of all threads since the process began.
+double process_cpu_seconds() {
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 }  // namespace
@@ -57,6 +65,7 @@ Result<std::unique_ptr<RenderSession>> RenderSession::open(EmbreeDeviceRef devic
 Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& lights, const RenderOptions& options,
                                           Film& film, const Job& job) {
   const auto start = std::chrono::steady_clock::now();
+  const double cpu_start = process_cpu_seconds();
   const Stats before = runtime_->stats();
   runtime_->set_cameras({camera.tessellation()});
   FARFIELD_TRY_LET(auto plan, runtime_->plan_frame());
@@ -69,6 +78,7 @@ Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& li
   const Stats after = runtime_->stats();
   FrameReport report;
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  report.cpu_seconds = process_cpu_seconds() - cpu_start;
   report.load_seconds = after.load_seconds - before.load_seconds;
   report.accounted_bytes = after.accounted_bytes;
   report.rss_bytes = resident_set_bytes();

@@ -15,11 +15,13 @@ namespace fs = std::filesystem;
 
 namespace {
 
-std::vector<size_t> numbers_in_use(const GltfScene& scene) {
+// Of the assets in use, those of this part.
+std::vector<size_t> numbers_to_bake(const SceneBakeOptions& options, const GltfScene& scene) {
   const std::vector<bool> in_use = assets_in_use(scene);
   std::vector<size_t> numbers;
+  uint32_t count = 0;
   for (size_t mesh = 0; mesh < in_use.size(); ++mesh)
-    if (in_use[mesh]) numbers.push_back(mesh);
+    if (in_use[mesh] && count++ % options.part_count == options.part) numbers.push_back(mesh);
   return numbers;
 }
 
@@ -70,7 +72,7 @@ Result<size_t> bake_scene_assets(const SceneBakeOptions& options) {
 
   size_t failed = 0;
   FileHashes hashes;  // the scene is read once for them, however many assets it has
-  const std::vector<size_t> numbers = numbers_in_use(scene);
+  const std::vector<size_t> numbers = numbers_to_bake(options, scene);
   for (size_t i = 0; i < numbers.size(); ++i) {
     const GltfMesh& mesh = scene.meshes[numbers[i]];
     BakeOptions how = asset_bake_options(options, scene, numbers[i], hashes);

@@ -26,6 +26,8 @@ struct SceneBakeOptions {
   uint32_t rays_per_voxel = 200;
   bool source_only = false;  ///< level 0 alone
   AssemblyRule assemblies = AssemblyRule::Repeated;
+  /// Only each part_count-th asset, from number `part` on: for processes that share the work. part < part_count.
+  uint32_t part = 0, part_count = 1;
 
   /// Told of each asset before it is baked, and how it went. May be empty.
   std::function<void(const std::string& asset)> begin;
@@ -44,8 +46,8 @@ std::filesystem::path asset_folder(const SceneBakeOptions& options, const GltfMe
 BakeOptions asset_bake_options(const SceneBakeOptions& options, const GltfScene& scene, size_t mesh,
                                FileHashes& hashes);
 
-/// Bakes all assets of a scene that are missing or stale; one that cannot be baked does not keep the others from it.
-/// Returns how many failed. Errors: those of read_gltf_scene; Io (the library cannot be created),
+/// Bakes all assets of a scene (of its part) that are missing or stale; one that cannot be baked does not keep the
+/// others from it. Returns how many failed. Errors: those of read_gltf_scene; Io (the library cannot be created),
 /// Cancelled.
 Result<size_t> bake_scene_assets(const SceneBakeOptions& options);
 

@@ -44,9 +44,13 @@ DistantLight make_distant_light(const GltfLight& light) {
   return distant;
 }
 
+// What stood in front of a direction stands behind it.
+vec3 turn_half_about_y(const vec3& v) { return {-v.x, v.y, -v.z}; }
+
 // The sky of the brightest directional light, which is its sun; the others shine beside it.
-Environment make_sky(std::vector<GltfLight> directional) {
+Environment make_sky(std::vector<GltfLight> directional, bool turn_default_sun) {
   SunSkyOptions sky = default_sun_sky();
+  if (turn_default_sun) sky.sun_direction = turn_half_about_y(sky.sun_direction);
   std::stable_sort(directional.begin(), directional.end(),
                    [](const GltfLight& a, const GltfLight& b) { return strength(a) > strength(b); });
   std::vector<DistantLight> others;
@@ -103,13 +107,16 @@ Result<Lights> make_lights(const GltfScene& scene, const RenderOptions& options,
     else
       lights.points.push_back(make_point_light(light));
   }
+  if (options.turn_sun)
+    for (GltfLight& light : directional) light.direction = turn_half_about_y(light.direction);
 
   if (!options.environment.empty()) {
     FARFIELD_TRY_LET(auto environment, Environment::from_file(options.environment));
     lights.environment = environment;
     if (!directional.empty()) warnings.push_back("the environment image replaces the scene's directional lights");
+    if (options.turn_sun) warnings.push_back("the environment image is not turned with the sun");
   } else if (options.sky) {
-    lights.environment = make_sky(directional);
+    lights.environment = make_sky(directional, options.turn_sun);
   } else {
     lights.environment = make_darkness(directional);
     if (scene.lights.empty())

@@ -26,8 +26,9 @@ Camera make_camera(const GltfScene& scene, size_t index, double seconds, int wid
 
 /// Environment: options.environment, or sun and sky, or darkness where options.sky is off. The sky's sun is the
 /// brightest directional light, in its direction, colour and strength; without one default_sun_sky(). All other lights
-/// come as they are. What cannot be rendered (directional lights beside an environment image) and what leaves nothing
-/// to be seen adds a line to `warnings`. Errors: those of Environment::from_file.
+/// come as they are. options.turn_sun turns the sky and all directional lights. What cannot be rendered (directional
+/// lights beside an environment image, which is not turned either) and what leaves nothing to be seen adds a line to
+/// `warnings`. Errors: those of Environment::from_file.
 Result<Lights> make_lights(const GltfScene& scene, const RenderOptions& options, std::vector<std::string>& warnings);
 
 }  // namespace farfield

@@ -21,10 +21,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr uint64_t kMostRecordBytes = 256 << 20;
 constexpr int kSheetWidth = 1920;  ///< pixels, at most
-
-fs::path frame_path(const fs::path& folder, int frame) { return folder / fmt::format("frame_{:04}.exr", frame); }
 
 Result<void> write_record(const fs::path& path, const ShotRecord& record) {
   const std::string text = to_json(record);
@@ -44,8 +41,7 @@ RenderReport keep_frames(RenderReport report, const std::function<bool(int frame
 
 // What earlier runs of the same shot finished, whatever frames they were asked for. Empty if it was another shot.
 RenderReport finished_before(const fs::path& folder, const std::string& fingerprint) {
-  const auto text = read_small_file(folder / "shot.json", kMostRecordBytes);
-  const auto record = text ? shot_record_from_json(*text) : std::nullopt;
+  const auto record = read_shot_record(folder);
   if (!record || record->fingerprint != fingerprint) return {};
   return keep_frames(record->report, [&](int frame) {
     std::error_code ignored;
@@ -55,7 +51,7 @@ RenderReport finished_before(const fs::path& folder, const std::string& fingerpr
 
 std::vector<int> frames_to_render(const FrameRange& frames, const RenderReport& finished) {
   std::vector<int> missing;
-  for (int frame = frames.first; frame <= frames.last; frame += frames.step) {
+  for (const int frame : frames.numbers()) {
     const bool is_there = std::any_of(finished.frames.begin(), finished.frames.end(),
                                       [&](const FrameReport& report) { return report.frame == frame; });
     if (!is_there) missing.push_back(frame);
@@ -80,6 +76,14 @@ bool read_into_sheet(ContactSheet& sheet, int cell, const fs::path& frame) {
 }
 
 }  // namespace
+
+std::vector<int> FrameRange::numbers() const {
+  std::vector<int> numbers;
+  for (int frame = first; frame <= last; frame += step) numbers.push_back(frame);
+  return numbers;
+}
+
+fs::path frame_path(const fs::path& folder, int frame) { return folder / fmt::format("frame_{:04}.exr", frame); }
 
 Result<FrameRange> parse_frame_range(const std::string& text) {
   FrameRange range;

@@ -13,9 +13,13 @@ struct FrameRange {
   int step = 1;
 
   int count() const { return (last - first) / step + 1; }
+  std::vector<int> numbers() const;
 };
 /// Reads "A-B", "A-B:STEP" or "A". Errors: InvalidArgument (not of that form, B < A, STEP < 1).
 Result<FrameRange> parse_frame_range(const std::string& text);
+
+/// Where a frame of the shot in `folder` lies.
+std::filesystem::path frame_path(const std::filesystem::path& folder, int frame);
 
 /// Renders the frames into folder `out` (created): frame_NNNN.exr and .png, shot.json rewritten whole after each frame,
 /// contact_sheet.png at the end. Frames that earlier runs with the same options finished, of whatever range, are kept

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "base/file_io.h"
 #include "path_tracer/warning_log.h"
 
 namespace farfield {
@@ -11,6 +12,8 @@ namespace farfield {
 using Json = nlohmann::ordered_json;
 
 namespace {
+
+constexpr uint64_t kMostRecordBytes = 256 << 20;
 
 template <typename T>
 Json by_asset(const std::vector<std::string>& assets, const std::vector<T>& values) {
@@ -22,6 +25,7 @@ Json by_asset(const std::vector<std::string>& assets, const std::vector<T>& valu
 Json frame_to_json(const FrameReport& frame, const std::vector<std::string>& assets) {
   return {{"frame", frame.frame},
           {"seconds", frame.seconds},
+          {"cpu_seconds", frame.cpu_seconds},
           {"load_seconds", frame.load_seconds},
           {"accounted_bytes", frame.accounted_bytes},
           {"rss_bytes", frame.rss_bytes},
@@ -39,6 +43,7 @@ FrameReport frame_from_json(const Json& json, const std::vector<std::string>& as
   FrameReport frame;
   json.at("frame").get_to(frame.frame);
   json.at("seconds").get_to(frame.seconds);
+  frame.cpu_seconds = json.value("cpu_seconds", 0.0);  // absent before version 0.1
   json.at("load_seconds").get_to(frame.load_seconds);
   json.at("accounted_bytes").get_to(frame.accounted_bytes);
   json.at("rss_bytes").get_to(frame.rss_bytes);
@@ -93,6 +98,11 @@ std::optional<ShotRecord> shot_record_from_json(const std::string& text) {
   } catch (const Json::exception&) {
     return std::nullopt;  // half a file, or somebody else's: the shot starts anew
   }
+}
+
+std::optional<ShotRecord> read_shot_record(const std::filesystem::path& folder) {
+  const auto text = read_small_file(folder / "shot.json", kMostRecordBytes);
+  return text ? shot_record_from_json(*text) : std::nullopt;
 }
 
 RenderReport join_reports(const RenderReport& earlier, const RenderReport& later) {

@@ -7,6 +7,8 @@
 #include <optional>
 #include <utility>
 
+#include "base/bytes.h"
+
 namespace farfield::tool {
 namespace {
 
@@ -34,6 +36,42 @@ Result<PixelSize> parse_pixel_size(std::string_view text) {
   const auto size = read_pair(text, 'x', 1, 65536);
   if (!size) return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a size such as 640x360", text));
   return PixelSize{size->first, size->second};
+}
+
+Result<uint64_t> parse_budget(std::string_view text) {
+  const auto bytes = parse_bytes(text);
+  if (bytes && *bytes == 0) return make_error(ErrorCode::InvalidArgument, "nothing fits 0 bytes");
+  return bytes;
+}
+
+Result<float> parse_pixel_error(std::string_view text) {
+  float pixels = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), pixels);
+  const bool is_number = error == std::errc() && end == text.data() + text.size();
+  if (is_number && pixels > 0 && pixels <= 1e6f) return pixels;  // NaN is not
+  return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a number above 0, at most 1e6", text));
+}
+
+Result<uint32_t> parse_finest_grid(std::string_view text) {
+  const auto grid = read_number(text, 8, 1 << 16);
+  if (grid && (*grid & (*grid - 1)) == 0) return static_cast<uint32_t>(*grid);
+  return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a power of two from 8", text));
+}
+
+Result<uint32_t> parse_rays_per_voxel(std::string_view text) {
+  if (const auto rays = read_number(text, 1, 1000000)) return static_cast<uint32_t>(*rays);
+  return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a number from 1 to 1000000", text));
+}
+
+Result<Part> parse_part(std::string_view text) {
+  const auto part = read_pair(text, '/', 0, 1000000);
+  if (part && part->first < part->second)
+    return Part{static_cast<uint32_t>(part->first), static_cast<uint32_t>(part->second)};
+  return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a part such as 0/8 to 7/8", text));
+}
+
+tl::unexpected<Error> is_there_twice(std::string_view value) {
+  return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is there twice", value));
 }
 
 Result<LevelRange> parse_level_range(std::string_view text) {

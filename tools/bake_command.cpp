@@ -5,6 +5,7 @@
 #include "base/bytes.h"
 #include "base/parallel.h"
 #include "path_tracer/scene_assets.h"
+#include "tools/args.h"
 #include "tools/commands.h"
 #include "tools/console.h"
 #include "tools/flags.h"
@@ -19,6 +20,7 @@ struct BakeArguments {
   std::string source, output, report;
   bool whole_scene = false;
   AssemblyRule assemblies = AssemblyRule::Repeated;
+  Part part;
   int parent = 0;  // process that started this one for itself; 0: nobody did
   int threads = 0;
   bool warnings = true;
@@ -44,6 +46,8 @@ Result<void> bake_scene(const BakeArguments& arguments) {
   options.rays_per_voxel = arguments.options.rays_per_voxel;
   options.source_only = arguments.options.source_only;
   options.assemblies = arguments.assemblies;
+  options.part = arguments.part.number;
+  options.part_count = arguments.part.count;
   options.job = arguments.options.job;
   options.job.progress = [&](double done, const std::string& stage) { progress.update(done, stage); };
   const auto say = [&](const char* what, const std::string& asset) {
@@ -128,6 +132,10 @@ void add_bake_command(CLI::App& app, Action& action) {
   add_parsed_option(command, "--assemblies", arguments->assemblies, parse_assembly_rule,
                     "With --scene, what is one asset: repeated, marked, none")
       ->default_str(name_of(arguments->assemblies))
+      ->needs(scene);
+  add_parsed_option(command, "--part", arguments->part, parse_part,
+                    "With --scene, only each N-th asset from number I on: I/N, for processes that share the work")
+      ->default_str("0/1")
       ->needs(scene);
   command->add_option("--parent", arguments->parent, "Process to end with")->group("");  // for render and shot
   command->add_flag("--source-only", options.source_only, "Write level 0 only: the source, ready to render");

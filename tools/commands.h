@@ -22,6 +22,7 @@ void add_verify_command(CLI::App& app, Action& action);
 void add_evaluate_command(CLI::App& app, Action& action);
 void add_render_command(CLI::App& app, Action& action);
 void add_shot_command(CLI::App& app, Action& action);
+void add_trade_command(CLI::App& app, Action& action);
 void add_sky_command(CLI::App& app, Action& action);
 
 }  // namespace farfield::tool

@@ -11,11 +11,6 @@ namespace farfield::tool {
 
 /// Checks of an option's text, as CLI11 wants them: what is wrong, or nothing.
 inline std::string is_named(const std::string& text) { return text.empty() ? "the name is empty" : ""; }
-inline std::string is_finest_grid(const std::string& text) {
-  uint32_t grid = 0;
-  const bool fits = CLI::detail::lexical_cast(text, grid) && grid >= 8 && (grid & (grid - 1)) == 0;
-  return fits ? "" : "\"" + text + "\" is not a power of two from 8";
-}
 
 /// An option that `parse` (text -> Result<T>) reads into `target`; what it refuses is an error that names the flag.
 template <typename T, typename Parse>

@@ -75,6 +75,7 @@ int run(int argc, char** argv) {
   tool::add_evaluate_command(app, action);
   tool::add_render_command(app, action);
   tool::add_shot_command(app, action);
+  tool::add_trade_command(app, action);
   tool::add_sky_command(app, action);
 
   try {
@@ -90,6 +91,7 @@ int run(int argc, char** argv) {
   if (result) return 0;
   tool::print_warnings(app.get_subcommands().front()->get_name(), result.error().warnings);
   const bool is_interrupted = result.error().code == ErrorCode::Cancelled;
+  if (is_interrupted && result.error().message.empty()) return kInterrupted;  // somebody else says it
   fmt::print(stderr, "{}: {}\n", name_of_command(app),
              is_interrupted ? "interrupted" : tool::one_line(result.error().message));
   return is_interrupted ? kInterrupted : kFailed;

@@ -37,7 +37,8 @@ void add_render_command(CLI::App& app, Action& action) {
   auto arguments = std::make_shared<FrameArguments>();
   CLI::App* command =
       app.add_subcommand("render", "Render one frame of a glTF scene; bakes its meshes first if need be");
-  add_render_flags(command, *arguments, "EXR file to write; a PNG preview goes beside it");
+  add_picture_flags(command, *arguments, "EXR file to write; a PNG preview goes beside it");
+  add_level_flags(command, arguments->options);
   command->add_option("--frame", arguments->frame, "Frame n is the scene at n / fps seconds, see --fps")
       ->check(CLI::Range(0, 1 << 24))
       ->capture_default_str();

@@ -3,8 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
+#include <cstdio>
+#include <mutex>
+
 #include "base/bytes.h"
 #include "base/parallel.h"
+#include "path_tracer/warning_log.h"
 #include "tools/args.h"
 #include "tools/console.h"
 #include "tools/flags.h"
@@ -21,22 +26,9 @@ Result<Blend> parse_blend(const std::string& text) {
   return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a way to blend; dissolve is", text));
 }
 
-Result<uint64_t> parse_budget(const std::string& text) {
-  const auto bytes = parse_bytes(text);
-  if (bytes && *bytes == 0) return make_error(ErrorCode::InvalidArgument, "nothing fits 0 bytes");
-  return bytes;
-}
-
-/// What CLI::PositiveNumber says, but NaN is no number either.
-std::string is_scale(const std::string& text) {
-  float scale = 0;
-  if (CLI::detail::lexical_cast(text, scale) && scale > 0 && scale <= 1e6f) return {};
-  return fmt::format("\"{}\" is not a number above 0, at most 1e6", text);
-}
-
 }  // namespace
 
-void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::string& output_help) {
+void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std::string& output_help) {
   RenderOptions& options = arguments.options;
   command->add_option("scene", arguments.scene, "glTF scene: .glb or .gltf")->required()->check(is_named);
   command->add_option("-o,--output", arguments.output, output_help)->required()->check(is_named);
@@ -51,24 +43,13 @@ void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::
       ->check(CLI::Range(1, 1 << 20))
       ->capture_default_str();
   command->add_option("--seed", options.trace.seed, "Of the random numbers");
-  add_parsed_option(command, "--budget", options.budget_bytes, parse_budget,
-                    "Memory for assets, e.g. 300M or 4GiB: a hard limit")
-      ->default_str(format_bytes(options.budget_bytes));
   command->add_option("--assets", arguments.assets,
                       "Folder of baked assets; what is missing is baked. Without it farfield-assets beside the scene");
   add_parsed_option(command, "--blend", options.blend, parse_blend, "How neighbouring levels are mixed: dissolve")
       ->default_str("dissolve");
-  command
-      ->add_option("--pixel-error", options.pixel_error,
-                   "How wide voxels may look, in pixels: above 1 coarser, below 1 finer")
-      ->check(is_scale)
-      ->capture_default_str();
-  command->add_flag("--full-detail", options.full_detail, "Render the sources, without levels, for comparison");
   CLI::Option* environment = command->add_option("--environment", arguments.environment,
                                                  "Light from a latitude-longitude picture, EXR or Radiance HDR");
   command->add_flag("!--no-sky", options.sky, "No sun and sky: the scene's own lights alone")->excludes(environment);
-  command->add_flag("--cryptomatte", options.cryptomatte,
-                    "Also write which objects and materials each pixel shows, for mattes by name (Cryptomatte)");
   command->add_option("--camera", options.camera, "Name or index of a camera of the scene. Without it the first");
   command
       ->add_option("--fps", options.frames_per_second,
@@ -81,22 +62,65 @@ void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::
                     "What is baked as one: trees of several meshes that the scene repeats, or only what it marks, or "
                     "nothing: repeated, marked, none")
       ->default_str(name_of(options.assemblies));
-  command->add_option("--finest-grid", options.finest_grid, "Of assets that have to be baked, a power of two")
-      ->check(is_finest_grid)
-      ->capture_default_str();
   command->add_option("--threads", arguments.threads, "0: as many as the machine has")
       ->check(CLI::Range(0, 4096))
       ->capture_default_str();
 }
 
-Result<RenderReport> run_with_progress(std::string_view command, RenderArguments& arguments,
-                                       const std::function<Result<RenderReport>(const RenderOptions&)>& job) {
+void add_level_flags(CLI::App* command, RenderOptions& options) {
+  add_parsed_option(command, "--budget", options.budget_bytes, parse_budget,
+                    "Memory for assets, e.g. 300M or 4GiB: a hard limit")
+      ->default_str(format_bytes(options.budget_bytes));
+  add_parsed_option(command, "--pixel-error", options.pixel_error, parse_pixel_error,
+                    "How wide voxels may look, in pixels: above 1 coarser, below 1 finer")
+      ->default_str("1");
+  command->add_flag("--full-detail", options.full_detail, "Render the sources, without levels, for comparison");
+  command
+      ->add_flag("--turn-sun", options.turn_sun,
+                 "Sun, sky and directional lights from the opposite side: what was lit from the front is from behind")
+      ->excludes(command->get_option("--environment"));
+  command->add_flag("--cryptomatte", options.cryptomatte,
+                    "Also write which objects and materials each pixel shows, for mattes by name (Cryptomatte)");
+  add_parsed_option(command, "--finest-grid", options.finest_grid, parse_finest_grid,
+                    "Of assets that have to be baked, a power of two")
+      ->default_str(fmt::format("{}", options.finest_grid));
+  add_parsed_option(command, "--rays-per-voxel", options.rays_per_voxel, parse_rays_per_voxel,
+                    "Of assets that have to be baked: what each voxel's density is measured with")
+      ->default_str(fmt::format("{}", options.rays_per_voxel));
+}
+
+namespace {
+
+void set_files(RenderArguments& arguments) {
+  arguments.options.scene = arguments.scene;
+  arguments.options.assets = arguments.assets;
+  arguments.options.environment = arguments.environment;
+}
+
+/// "progress 0.42 frame 60 (3/7)": what is done, as lines on standard output, ten a second at most. Any thread.
+class ProgressLines {
+ public:
+  void update(double done, const std::string& what) {
+    const auto now = std::chrono::steady_clock::now();
+    const std::lock_guard lock(mutex_);
+    if (now - last_written_ < std::chrono::milliseconds(100)) return;
+    last_written_ = now;
+    fmt::print("progress {:.4f} {}\n", done, what);
+    std::fflush(stdout);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::chrono::steady_clock::time_point last_written_{};  // guarded by mutex_
+};
+
+}  // namespace
+
+Result<RenderReport> run_with_progress(std::string_view command, RenderArguments& arguments, const RenderTask& task) {
   const ThreadLimit limit(arguments.threads);
   ProgressLine progress;
   RenderOptions& options = arguments.options;
-  options.scene = arguments.scene;
-  options.assets = arguments.assets;
-  options.environment = arguments.environment;
+  set_files(arguments);
   options.job = {[&](double done, const std::string& stage) { progress.update(done, stage); }, &catch_interrupts()};
   options.message = [&](const std::string& line) {
     if (!stdout_is_terminal()) return;
@@ -107,7 +131,24 @@ Result<RenderReport> run_with_progress(std::string_view command, RenderArguments
     progress.clear();
     print_warnings(command, {line});
   };
-  return job(options);
+  return task(options);
+}
+
+Result<RenderReport> run_for_parent(RenderArguments& arguments, int parent, const RenderTask& task) {
+  const ThreadLimit limit(arguments.threads);
+  ProgressLines progress;
+  WarningLog warnings({});
+  RenderOptions& options = arguments.options;
+  set_files(arguments);
+  options.job = {[&](double done, const std::string& stage) { progress.update(done, stage); }, &catch_interrupts()};
+  options.warning = [&](const std::string& line) { warnings.add(line); };
+  end_with_parent(parent);
+  auto report = task(options);
+  if (report) return report;
+  Error error = report.error();
+  error.warnings = warnings.lines();
+  if (error.code == ErrorCode::Cancelled) error = {ErrorCode::Cancelled, ""};  // the parent says so
+  return tl::unexpected(std::move(error));
 }
 
 }  // namespace farfield::tool

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `farfield render` and `farfield shot` have in common.
+// What `farfield render`, `farfield shot` and `farfield trade` have in common.
 #pragma once
 
 #include <functional>
@@ -20,12 +20,19 @@ struct RenderArguments {
   int threads = 0;
 };
 
-/// Adds the scene, the common flags and -o (with `output_help`).
-void add_render_flags(CLI::App* command, RenderArguments& arguments, const std::string& output_help);
+/// Adds the scene, -o (with `output_help`) and what the picture is of: size, samples, light, camera, assets.
+void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std::string& output_help);
+/// Adds how coarse levels are, by budget, pixel error and bake, where the sun stands, and what else is written.
+void add_level_flags(CLI::App* command, RenderOptions& options);
 
-/// Runs `job` as `command` ("render", "shot") with the parsed options, progress on a terminal, and Ctrl-C; prints
-/// messages of the job when a person reads them.
-Result<RenderReport> run_with_progress(std::string_view command, RenderArguments& arguments,
-                                       const std::function<Result<RenderReport>(const RenderOptions&)>& job);
+using RenderTask = std::function<Result<RenderReport>(const RenderOptions&)>;
+
+/// Runs `task` as `command` ("render", "shot") with the parsed options, progress on a terminal, and Ctrl-C; prints
+/// messages of the task when a person reads them.
+Result<RenderReport> run_with_progress(std::string_view command, RenderArguments& arguments, const RenderTask& task);
+
+/// The same for `farfield trade`, the process `parent`, whose end is the end of this one: progress comes as lines on
+/// standard output, warnings are left to shot.json unless the task fails, and a cancelled task has no message.
+Result<RenderReport> run_for_parent(RenderArguments& arguments, int parent, const RenderTask& task);
 
 }  // namespace farfield::tool

@@ -17,7 +17,7 @@ offers() {
 }
 
 offers "bake" ba
-offers "bake info verify evaluate render shot sky" ""
+offers "bake info verify evaluate render shot trade sky" ""
 offers "--version" --ver
 offers "--budget" render --bud
 offers "--no-sky" render scene.glb -o out.exr --no

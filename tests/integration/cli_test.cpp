@@ -79,7 +79,7 @@ void expect_quiet_success(const ProcessOutput& output) {
   EXPECT_EQ(output.err, "");
 }
 
-const std::vector<std::string> kCommands = {"bake", "info", "verify", "evaluate", "render", "shot", "sky"};
+const std::vector<std::string> kCommands = {"bake", "info", "verify", "evaluate", "render", "shot", "trade", "sky"};
 
 TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
   const std::vector<std::vector<std::string>> flags = {
@@ -90,6 +90,8 @@ TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
       {"--source", "--other-source", "--levels", "--views", "--spp", "--json", "--sheet", "--images"},
       {"--frame", "--size", "--spp", "--budget", "--assets", "--blend", "--pixel-error", "--full-detail", "--output"},
       {"--frames", "--size", "--spp", "--budget", "--assets", "--blend", "--pixel-error", "--full-detail", "--output"},
+      {"--frames", "--size", "--spp", "--budget", "--assets", "--pixel-error", "--rays-per-voxel", "--finest-grid",
+       "--no-turned-sun", "--output"},
       {"--output", "--width"}};
   for (size_t i = 0; i < kCommands.size(); ++i) {
     const ProcessOutput help = farfield({kCommands[i], "--help"});
@@ -123,6 +125,8 @@ TEST(Usage, NonsenseIsOneLineThatPointsToTheHelp) {
       {"bake", "a.glb", "-o", "b", "--mesh", "2", "--scene"},
       {"bake", "a.glb", "-o", "b", "--assemblies", "all"},
       {"bake", "a.obj", "-o", "b", "c"},
+      {"bake", "a.glb", "-o", "b", "--scene", "--part", "2/2"},
+      {"bake", "a.glb", "-o", "b", "--part", "0/2"},
       {"info"},
       {"info", "a", "b"},
       {"verify"},
@@ -147,6 +151,18 @@ TEST(Usage, NonsenseIsOneLineThatPointsToTheHelp) {
       {"shot", "a.glb", "-o", "b", "--frames", "9-1"},
       {"shot", "a.glb", "-o", "b", "--frames", "0-9:0"},
       {"shot", "a.glb", "-o", "b", "--frames", ""},
+      {"shot", "a.glb", "-o", "b", "--frames", "0", "--pixel-error", "1,2"},
+      {"shot", "a.glb", "-o", "b", "--frames", "0", "--turn-sun", "--environment", "c.exr"},
+      {"trade", "a.glb", "-o", "b"},
+      {"trade", "a.glb", "--frames", "0-9"},
+      {"trade", "a.glb", "-o", "b", "--frames", "9-1"},
+      {"trade", "a.glb", "-o", "b", "--frames", "0", "--pixel-error", "1,0"},
+      {"trade", "a.glb", "-o", "b", "--frames", "0", "--pixel-error", "1,2,1"},
+      {"trade", "a.glb", "-o", "b", "--frames", "0", "--budget", "2G,lots"},
+      {"trade", "a.glb", "-o", "b", "--frames", "0", "--budget", "2G,"},
+      {"trade", "a.glb", "-o", "b", "--frames", "0", "--finest-grid", "512,100"},
+      {"trade", "a.glb", "-o", "b", "--frames", "0", "--rays-per-voxel", "0"},
+      {"trade", "a.glb", "-o", "b", "--frames", "0", "--full-detail"},
   };
   for (const auto& arguments : nonsense) {
     std::string line;
@@ -190,6 +206,7 @@ TEST_F(BadInput, MissingFilesAreNamed) {
   expect_one_line_error(farfield({"evaluate", path("no.farfield"), "--source", bush}), path("no.farfield"));
   expect_one_line_error(farfield({"render", path("no.glb"), "-o", path("a.exr")}), path("no.glb"));
   expect_one_line_error(farfield({"shot", path("no.glb"), "--frames", "0-1", "-o", path("shot")}), path("no.glb"));
+  expect_one_line_error(farfield({"trade", path("no.glb"), "--frames", "0-1", "-o", path("trade")}), path("no.glb"));
   EXPECT_FALSE(fs::exists(path("out.farfield") + "/manifest.json"));
 }
 
@@ -233,6 +250,7 @@ TEST_F(BadInput, UnwritableOutputIsNamedBeforeAnyWorkIsDone) {
   expect_one_line_error(farfield({"evaluate", path("a"), "--source", bush, "--sheet", path("no/a.png")}), "no/a.png");
   expect_one_line_error(farfield({"render", path("a.glb"), "-o", path("no/a.exr")}), "no/a.exr");
   expect_one_line_error(farfield({"render", path("a.glb"), "-o", "/dev/null"}), "/dev/null");
+  expect_one_line_error(farfield({"trade", bush, "--frames", "0", "-o", "/proc/nothing/trade"}), "/proc/nothing");
 }
 
 TEST_F(BadInput, GridsThatCannotBeAreRefused) {
@@ -482,6 +500,52 @@ TEST_F(WholeRoad, RenderAndShotOfAScene) {
   expect_quiet_success(farfield(render));
 }
 
+/// Two settings of a scene's bush against full detail, small and fast.
+std::vector<std::string> trade_of(const std::string& scene, const std::string& assets, const std::string& out) {
+  return {"trade",         scene, "--frames", "0-8:8", "--size",        "24x16", "--spp", "4",
+          "--finest-grid", "16",  "--assets", assets,  "--pixel-error", "1,8",   "-o",    out};
+}
+
+TEST_F(WholeRoad, TradeMeasuresAndIsNotRenderedAgain) {
+  test::write_bush_scene(path("scene.gltf"), 120);
+  const std::vector<std::string> trade = trade_of(path("scene.gltf"), path("trade_assets"), path("trade"));
+  expect_quiet_success(farfield(trade));
+  const std::string first = contents(path("trade/trade.json"));
+  const Json json = Json::parse(first);
+  EXPECT_EQ(json["frames"], Json({0, 8}));
+  ASSERT_EQ(json["settings"].size(), 3u);
+  for (const Json& setting : json["settings"]) {
+    ASSERT_EQ(setting["lights"].size(), 2u);
+    for (const Json& light : setting["lights"]) {
+      EXPECT_GT(light["cpu_seconds"], 0.0);
+      EXPECT_GT(light["variance"], 0.0);
+      EXPECT_GT(light["peak_accounted_bytes"], 1000);
+      EXPECT_EQ(light["frames"].size(), 2u);
+    }
+  }
+  const auto variance = [&](size_t light) { return json["settings"][0]["lights"][light]["variance"].get<double>(); };
+  EXPECT_NE(variance(0), variance(1)) << "the sun was not turned";
+  EXPECT_EQ(json["advice"].size(), 4u);
+  const std::string page = contents(path("trade/trade.html"));
+  EXPECT_EQ(page.rfind("<!DOCTYPE html>", 0), 0u);
+  EXPECT_NE(page.find("data:image/png;base64,iVBORw0KGgo"), std::string::npos) << "no picture";
+
+  // Times of an earlier run come again only if nothing was rendered anew.
+  expect_quiet_success(farfield(trade));
+  EXPECT_EQ(contents(path("trade/trade.json")), first);
+}
+
+TEST_F(WholeRoad, ABudgetThatCannotDoEndsATradeWithTheSettingAndTheReason) {
+  test::write_bush_scene(path("scene.gltf"), 120);
+  std::vector<std::string> trade = trade_of(path("scene.gltf"), path("trade_assets"), path("trade_small"));
+  trade.insert(trade.end(), {"--budget", "64M,1K"});
+  const ProcessOutput output = farfield(trade);
+  EXPECT_EQ(output.exit_code, 1);
+  EXPECT_NE(output.err.find("too small"), std::string::npos) << output.err;
+  EXPECT_NE(output.err.find("farfield trade: --budget 1K: "), std::string::npos) << output.err;
+  EXPECT_FALSE(fs::exists(path("trade_small/trade.json")));
+}
+
 /// A triangle, and a mesh "torn" whose positions reach past the end of their buffer.
 void write_scene_with_a_torn_mesh(const fs::path& path) {
   const std::string positions = test::raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 0});
@@ -527,6 +591,63 @@ TEST(SceneBake, SaysOfEachAssetHowItWentAndBakesTheOthers) {
   EXPECT_NE(bake.err.find("farfield bake: warning: torn: "), std::string::npos) << bake.err;
   EXPECT_NE(bake.err.find("1 of its assets cannot be baked"), std::string::npos) << bake.err;
   EXPECT_EQ(farfield({"verify", library + "/whole.farfield"}).exit_code, 0);
+}
+
+TEST(SceneBake, PartsShareTheAssets) {
+  const fs::path folder = fresh_folder("scene_parts");
+  const std::string scene = (folder / "scene.glb").string(), library = (folder / "assets").string();
+  write_scene_with_a_torn_mesh(scene);
+  const auto bake = [&](const std::string& part) {
+    return farfield({"bake", scene, "--scene", "-o", library, "--finest-grid", "16", "--part", part});
+  };
+  EXPECT_EQ(bake("0/2").out, "baking whole\nready whole\n");
+  EXPECT_EQ(bake("1/2").out, "baking torn\nfailed torn\n");
+  EXPECT_EQ(bake("2/3").out, "");
+  EXPECT_EQ(bake("2/3").exit_code, 0);
+}
+
+/// A task script of scripts/slurm, as number `task`, without Slurm.
+ProcessOutput run_task(const std::string& script, int task, std::vector<std::string> arguments) {
+  setenv("FARFIELD", FARFIELD_TOOL, 1);
+  setenv("FARFIELD_TASK", std::to_string(task).c_str(), 1);
+  setenv("FARFIELD_MEMORY_MB", "300", 1);
+  arguments.insert(arguments.begin(), FARFIELD_SOURCE_DIR "/scripts/slurm/" + script);
+  return run_process(arguments);
+}
+
+TEST(Farm, TasksTogetherRenderTheShotWithinTheJobsMemory) {
+  const fs::path folder = fresh_folder("farm");
+  const std::string scene = (folder / "scene.gltf").string(), assets = (folder / "assets").string();
+  test::write_bush_scene(scene, 60);
+  const std::vector<std::string> how = {"--finest-grid", "16"};
+  for (int task = 0; task < 2; ++task) {
+    const ProcessOutput bake = run_task("bake_task", task, {scene, assets, "2", how[0], how[1]});
+    EXPECT_EQ(bake.exit_code, 0) << bake.err;
+  }
+  const std::vector<std::string> picture = {"--assets", assets, "--size", "16x8", "--spp", "1", how[0], how[1]};
+  const auto frames = [&](int task, const std::string& range) {
+    std::vector<std::string> arguments = {scene, (folder / "frames").string(), range, "2"};
+    arguments.insert(arguments.end(), picture.begin(), picture.end());
+    return run_task("shot_task", task, arguments);
+  };
+  for (int task = 0; task < 4; ++task) expect_quiet_success(frames(task, "2-10:2"));  // the fourth has nothing to do
+
+  std::vector<std::string> whole = {"shot",     scene,    "-o",       (folder / "whole").string(),
+                                    "--frames", "2-10:2", "--budget", "44M"};
+  whole.insert(whole.end(), picture.begin(), picture.end());
+  expect_quiet_success(farfield(whole));
+  for (const char* frame : {"02", "04", "06", "08", "10"}) {
+    const std::string name = std::string("frame_00") + frame + ".exr";
+    EXPECT_EQ(contents(folder / "frames" / name), contents(folder / "whole" / name)) << name;
+  }
+  EXPECT_EQ(Json::parse(contents(folder / "frames/tasks/2/shot.json"))["budget_bytes"], 44 << 20);
+  EXPECT_FALSE(fs::exists(folder / "frames/tasks/3"));
+
+  for (const char* range : {"", "5", "9-1:0", "0-9:x"}) {
+    const ProcessOutput wrong = frames(0, range);
+    EXPECT_EQ(wrong.exit_code, 2) << range;
+    EXPECT_EQ(wrong.err.rfind("shot_task: ", 0), 0u) << wrong.err;
+  }
 }
 
 /// Warnings first, one a line, then the error.
@@ -598,6 +719,24 @@ TEST(Interrupt, ABakeStopsInOrderAndGoesOnLater) {
   expect_quiet_success(farfield(bake));
   EXPECT_FALSE(fs::exists(asset + ".partial"));
   EXPECT_EQ(farfield({"verify", asset}).exit_code, 0);
+}
+
+TEST(Interrupt, ATradeSaysSoOnceAndGoesOnLater) {
+  const fs::path folder = fresh_folder("interrupt_trade");
+  test::write_bush_scene(folder / "scene.gltf", 60);
+  const std::vector<std::string> trade =
+      trade_of((folder / "scene.gltf").string(), (folder / "assets").string(), (folder / "trade").string());
+  const fs::path first = folder / "trade/renders/full_detail/own_0/shot.json";
+  const ProcessOutput interrupted = farfield(trade, [&] { return fs::exists(first); });
+  EXPECT_EQ(interrupted.exit_code, 130);
+  EXPECT_EQ(interrupted.err, "farfield trade: interrupted\n");
+  EXPECT_FALSE(fs::exists(folder / "trade/trade.json"));
+  const std::string kept = contents(folder / "trade/renders/full_detail/own_0/frame_0000.exr");
+  const auto written = fs::last_write_time(folder / "trade/renders/full_detail/own_0/frame_0000.exr");
+  expect_quiet_success(farfield(trade));
+  EXPECT_EQ(contents(folder / "trade/renders/full_detail/own_0/frame_0000.exr"), kept);
+  EXPECT_EQ(fs::last_write_time(folder / "trade/renders/full_detail/own_0/frame_0000.exr"), written);
+  EXPECT_TRUE(fs::exists(folder / "trade/trade.json"));
 }
 
 TEST(Interrupt, AShotKeepsItsFrames) {

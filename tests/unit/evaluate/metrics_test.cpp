@@ -11,40 +11,15 @@
 
 #include "base/random.h"
 #include "base/vec.h"
+#include "tests/support/pictures.h"
 
 namespace farfield {
 namespace {
 
-const std::vector<std::string> kRgba = {"R", "G", "B", "A"};
+using test::noisy_parts;
+using test::picture;
 
-/// A picture from its pixels.
-Image picture(int width, int height, const std::function<vec4(int x, int y)>& pixel) {
-  Image image(width, height, kRgba);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      const vec4 value = pixel(x, y);
-      for (int c = 0; c < 4; ++c) image.pixel(x, y)[c] = value[c];
-    }
-  return image;
-}
-
-Image constant(int size, const vec4& value) {
-  return picture(size, size, [&](int, int) { return value; });
-}
-
-float normal(Rng& rng) {  // Box and Muller
-  const float u = 1.0f - rng.next(), v = rng.next();
-  return std::sqrt(-2.0f * std::log(u)) * std::cos(2.0f * kPi * v);
-}
-
-/// Independent parts of the picture: Gaussian noise such that their mean has noise of standard deviation sigma.
-std::vector<Image> noisy_parts(const Image& truth, float sigma, uint64_t seed) {
-  Rng rng(seed);
-  std::vector<Image> parts(kParts, truth);
-  for (Image& part : parts)
-    for (float& value : part.values) value += sigma * std::sqrt(static_cast<float>(kParts)) * normal(rng);
-  return parts;
-}
+Image constant(int size, const vec4& value) { return test::constant_picture(size, size, value); }
 
 ErrorMetrics compare(const std::vector<Image>& source, const std::vector<Image>& level) {
   const auto sums = sum_view(source, level);
@@ -132,7 +107,7 @@ TEST(ErrorMetrics, GaussianErrorIsRecoveredUnderNoiseOfAnySize) {
   Rng rng(7);
   const Image source = constant(size, {0.5f, 0.5f, 0.5f, 0.5f});
   Image level = source;
-  for (float& value : level.values) value += 0.05f * normal(rng);
+  for (float& value : level.values) value += 0.05f * test::normal(rng);
   const double truth = compare_exact(source, level).color_error.value.value();
   EXPECT_NEAR(truth, std::sqrt(2.0 / 3.14159265358979) * 0.1, 0.001);
   for (const float sigma : {0.01f, 0.03f, 0.05f, 0.1f}) {

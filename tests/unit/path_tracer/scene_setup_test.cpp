@@ -103,6 +103,26 @@ TEST(MakeLights, BrightestDirectionalLightIsTheSunAndTheOthersShineBesideIt) {
   EXPECT_NEAR(second.x * kPi * 0.00465f * 0.00465f, 1.0f, 0.01f);  // 683 lux are 1 W / m^2
 }
 
+// About +y: what is lit from the front comes to be lit from behind, as high as before.
+TEST(MakeLights, TheTurnedSunStandsOppositeAndSoDoesItsSky) {
+  const vec3 towards_sun = glm::normalize(vec3(1, 2, -0.5f));
+  RenderOptions turned;
+  turned.turn_sun = true;
+  for (const bool has_own_sun : {true, false}) {
+    GltfScene scene;
+    if (has_own_sun) scene.lights = {directional(-towards_sun, 3073.5f)};
+    std::vector<std::string> warnings;
+    const auto before = make_lights(scene, RenderOptions(), warnings), after = make_lights(scene, turned, warnings);
+    ASSERT_TRUE(before && after);
+    EXPECT_TRUE(warnings.empty());
+    const vec3 at = has_own_sun ? towards_sun : glm::normalize(default_sun_sky().sun_direction);
+    for (const vec3& wi : {at, glm::normalize(vec3(0.3f, 0.4f, 0.9f)), glm::normalize(vec3(1, -0.2f, 0))}) {
+      const vec3 was = before->environment.radiance(wi), is = after->environment.radiance({-wi.x, wi.y, -wi.z});
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(is[c], was[c], 1e-3f * was[c]) << has_own_sun;
+    }
+  }
+}
+
 TEST(MakeLights, WithoutSkyOnlyTheScenesOwnLightsShine) {
   GltfScene scene;
   scene.lights = {directional({0, -1, 0}, 683), directional({-1, 0, 0}, 1366)};

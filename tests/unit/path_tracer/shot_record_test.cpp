@@ -12,6 +12,7 @@ FrameReport frame_report(int frame) {
   FrameReport report;
   report.frame = frame;
   report.seconds = 1.5 + frame;
+  report.cpu_seconds = 2.75;
   report.load_seconds = 0.25;
   report.accounted_bytes = uint64_t{5} << 32;
   report.rss_bytes = 1000;
@@ -48,6 +49,7 @@ TEST(ShotRecord, HasTheKeysThatChecksRead) {
   const auto& frame = json["frames"][1];
   EXPECT_EQ(frame["frame"], 10);
   EXPECT_EQ(frame["seconds"], 11.5);
+  EXPECT_EQ(frame["cpu_seconds"], 2.75);
   EXPECT_EQ(frame["load_seconds"], 0.25);
   EXPECT_EQ(frame["accounted_bytes"], uint64_t{5} << 32);
   EXPECT_EQ(frame["bias"], 0.125);

@@ -43,5 +43,45 @@ TEST(ParseLevelRange, RefusesEverythingElse) {
     EXPECT_FALSE(parse_level_range(text)) << text;
 }
 
+TEST(ParsePixelError, ReadsNumbersAboveZero) {
+  EXPECT_EQ(parse_pixel_error("0.5").value(), 0.5f);
+  EXPECT_EQ(parse_pixel_error("1e3").value(), 1000.0f);
+  for (const char* text : {"", "0", "-1", "nan", "inf", "2x", " 1", "1e7", "1,5"})
+    EXPECT_FALSE(parse_pixel_error(text)) << text;
+}
+
+TEST(ParseFinestGrid, ReadsPowersOfTwo) {
+  EXPECT_EQ(parse_finest_grid("8").value(), 8u);
+  EXPECT_EQ(parse_finest_grid("1024").value(), 1024u);
+  for (const char* text : {"", "0", "4", "100", "-64", "64.0", "131072", "many"})
+    EXPECT_FALSE(parse_finest_grid(text)) << text;
+}
+
+TEST(ParseBudget, RefusesNothing) {
+  EXPECT_EQ(parse_budget("2K").value(), 2048u);
+  for (const char* text : {"0", "-1", "lots", ""}) EXPECT_FALSE(parse_budget(text)) << text;
+}
+
+TEST(ParseRaysPerVoxel, ReadsCounts) {
+  EXPECT_EQ(parse_rays_per_voxel("200").value(), 200u);
+  for (const char* text : {"0", "-1", "1.5", "", "1000001"}) EXPECT_FALSE(parse_rays_per_voxel(text)) << text;
+}
+
+TEST(ParsePart, ReadsANumberBelowACount) {
+  EXPECT_EQ(parse_part("3/8")->number, 3u);
+  EXPECT_EQ(parse_part("3/8")->count, 8u);
+  EXPECT_TRUE(parse_part("0/1"));
+  for (const char* text : {"", "/", "8/8", "9/8", "-1/8", "0/0", "1", "1/", "a/b", "1/2/3"})
+    EXPECT_FALSE(parse_part(text)) << text;
+}
+
+TEST(ParseList, ReadsEachValueAndRefusesTheSameTwice) {
+  EXPECT_EQ(parse_list(std::string_view("1,0.5,2"), parse_pixel_error).value(), (std::vector<float>{1, 0.5f, 2}));
+  EXPECT_EQ(parse_list(std::string_view("2G"), parse_budget).value(), (std::vector<uint64_t>{uint64_t{2} << 30}));
+  for (const char* text : {"", "1,", ",1", "1,,2", "1;2", "1,1.0", "1,x"})
+    EXPECT_FALSE(parse_list(std::string_view(text), parse_pixel_error)) << text;
+  EXPECT_NE(parse_list(std::string_view("1,2,1"), parse_pixel_error).error().message.find("twice"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace farfield::tool
