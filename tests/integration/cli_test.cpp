@@ -521,12 +521,20 @@ TEST(SceneBake, SaysOfEachAssetHowItWentAndBakesTheOthers) {
   const fs::path folder = fresh_folder("scene_bake");
   const std::string scene = (folder / "scene.glb").string(), library = (folder / "assets").string();
   write_scene_with_a_torn_mesh(scene);
-  const ProcessOutput bake = farfield({"bake", scene, "--scene", "-o", library, "--finest-grid", "16"});
+  const std::string report = (folder / "report.json").string();
+  const ProcessOutput bake =
+      farfield({"bake", scene, "--scene", "-o", library, "--finest-grid", "16", "--report", report});
   EXPECT_EQ(bake.exit_code, 1);
   EXPECT_EQ(bake.out, "baking whole\nready whole\nbaking torn\nfailed torn\n");
   EXPECT_NE(bake.err.find("farfield bake: warning: torn: "), std::string::npos) << bake.err;
   EXPECT_NE(bake.err.find("1 of its assets cannot be baked"), std::string::npos) << bake.err;
   EXPECT_EQ(farfield({"verify", library + "/whole.farfield"}).exit_code, 0);
+  const Json assets = Json::parse(contents(report))["assets"];
+  ASSERT_EQ(assets.size(), 1u) << "of what was baked";
+  EXPECT_EQ(assets[0]["asset"], "whole");
+  EXPECT_GT(assets[0]["cpu_seconds"], 0.0);
+  EXPECT_GT(assets[0]["peak_bytes"], 1u << 20);
+  EXPECT_FALSE(assets[0]["levels"].empty());
 }
 
 /// Warnings first, one a line, then the error.
