@@ -60,7 +60,7 @@ BakeOptions asset_bake_options(const SceneBakeOptions& options, const GltfScene&
 }
 
 Result<size_t> bake_scene_assets(const SceneBakeOptions& options) {
-  FARFIELD_TRY_LET(const auto scene, read_gltf_scene(options.scene, options.assemblies));
+  FARFIELD_TRY_LET(auto scene, read_gltf_scene(options.scene, options.assemblies));
   for (const std::string& warning : scene.warnings)
     if (options.warning) options.warning(warning);
   std::error_code error;
@@ -71,6 +71,7 @@ Result<size_t> bake_scene_assets(const SceneBakeOptions& options) {
   size_t failed = 0;
   FileHashes hashes;  // the scene is read once for them, however many assets it has
   const std::vector<size_t> numbers = numbers_in_use(scene);
+  scene.instances = {};  // a million take as much as a bake
   for (size_t i = 0; i < numbers.size(); ++i) {
     const GltfMesh& mesh = scene.meshes[numbers[i]];
     BakeOptions how = asset_bake_options(options, scene, numbers[i], hashes);

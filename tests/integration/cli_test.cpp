@@ -480,6 +480,15 @@ TEST_F(WholeRoad, RenderAndShotOfAScene) {
 
   render.insert(render.end(), {"--full-detail"});
   expect_quiet_success(farfield(render));
+  const std::string of_whole_asset = contents(path("frame.exr"));
+  const auto is_source = [](const fs::path& name) { return name.string().find(".source.") != std::string::npos; };
+  for (const auto& entry : fs::directory_iterator(path("assets/scene")))
+    EXPECT_FALSE(is_source(entry.path().filename())) << "baked again for its level 0";
+  fs::remove_all(path("assets"));
+  expect_quiet_success(farfield(render));
+  EXPECT_TRUE(std::ranges::all_of(fs::directory_iterator(path("assets/scene")),
+                                  [&](const auto& entry) { return is_source(entry.path().filename()); }));
+  EXPECT_EQ(contents(path("frame.exr")), of_whole_asset);
 }
 
 /// A triangle, and a mesh "torn" whose positions reach past the end of their buffer.
