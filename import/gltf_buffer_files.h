@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/free_memory.h"
 #include "base/hash.h"
 #include "base/result.h"
 
@@ -35,7 +36,7 @@ class GltfBufferFiles {
   /// BadFile (another size than promised).
   Result<std::span<const unsigned char>> bytes(size_t buffer);
   /// Drops what bytes() has read.
-  void forget(size_t buffer) { buffers_.at(buffer).bytes = {}; }
+  void forget(size_t buffer) { free_memory(buffers_.at(buffer).bytes); }
 
   /// Those that were read, relative to the folder of the glTF file, in the order in which they were.
   const std::vector<HashedFile>& files_read() const { return files_read_; }

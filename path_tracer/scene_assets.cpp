@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <system_error>
 
+#include "base/free_memory.h"
 #include "base/result.h"
 
 namespace farfield {
@@ -71,7 +72,7 @@ Result<size_t> bake_scene_assets(const SceneBakeOptions& options) {
   size_t failed = 0;
   FileHashes hashes;  // the scene is read once for them, however many assets it has
   const std::vector<size_t> numbers = numbers_in_use(scene);
-  scene.instances = {};  // a million take as much as a bake
+  free_memory(scene.instances);  // a million take as much as a bake
   for (size_t i = 0; i < numbers.size(); ++i) {
     const GltfMesh& mesh = scene.meshes[numbers[i]];
     BakeOptions how = asset_bake_options(options, scene, numbers[i], hashes);
