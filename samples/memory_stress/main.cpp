@@ -139,11 +139,11 @@ farfield::Result<farfield::PlanSummary> plan(Forest& forest, size_t frame) {
   return forest.runtime->plan_frame();
 }
 
-/// The light of an even sky that comes along one path.
+/// The light that comes along one path: an even sky's, and what glows.
 vec3 light_along_path(const Forest& forest, const host::Camera& camera, int x, int y) {
   farfield::Rng rng(static_cast<uint64_t>(y) * kWidth + static_cast<uint64_t>(x));
   vec3 origin = camera.eye, direction = camera.direction(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
-  vec3 throughput(1.0f);
+  vec3 throughput(1.0f), light(0.0f);
   farfield::RayContext context;
   context.path_seed = rng.next_uint();
   context.cone_spread = camera.pixel_spread();
@@ -151,8 +151,9 @@ vec3 light_along_path(const Forest& forest, const host::Camera& camera, int x, i
     RTCRayHit ray = host::make_ray(origin, direction);
     context.ray_seed = rng.next_uint();
     rtcIntersect1(forest.scene, &context.embree, &ray);
-    if (ray.hit.geomID != forest.runtime->geometry_id()) return throughput;
+    if (ray.hit.geomID != forest.runtime->geometry_id()) return light + throughput;
     const farfield::Interaction interaction = forest.runtime->interaction(ray, context);
+    light += throughput * interaction.emission;
     const farfield::ScatterSample sample = interaction.sample(rng);
     throughput *= sample.weight;
     context.cone_width += context.cone_spread * ray.ray.tfar;
@@ -161,7 +162,7 @@ vec3 light_along_path(const Forest& forest, const host::Camera& camera, int x, i
     origin = interaction.ray_origin(sample.wi);
     direction = sample.wi;
   }
-  return vec3(0.0f);
+  return light;
 }
 
 Picture render(const Forest& forest, size_t frame, unsigned threads) {

@@ -51,13 +51,13 @@ glm::mat4x3 place(Rng& rng, float side) {
 /// How a host may build its scene.
 struct HostScene {
   const char* name;
-  RTCSceneFlags flags;
-  RTCBuildQuality quality;
+  SceneBuild build;
+  uint32_t bytes_per_instance = kSceneBytesPerInstance;
 };
-constexpr HostScene kHostScenes[] = {{"default", RTC_SCENE_FLAG_NONE, RTC_BUILD_QUALITY_MEDIUM},
-                                     {"compact", RTC_SCENE_FLAG_COMPACT, RTC_BUILD_QUALITY_MEDIUM},
-                                     {"low quality", RTC_SCENE_FLAG_NONE, RTC_BUILD_QUALITY_LOW},
-                                     {"high quality", RTC_SCENE_FLAG_NONE, RTC_BUILD_QUALITY_HIGH}};
+constexpr HostScene kHostScenes[] = {{"default", SceneBuild::Default},
+                                     {"compact", SceneBuild::Compact},
+                                     {"low quality", SceneBuild::Small, kSmallSceneBytesPerInstance},
+                                     {"high quality", SceneBuild::HighQuality}};
 
 /// Nanoseconds of a ray from anywhere above a square field, steeply or along it.
 double ray_nanoseconds(EmbreeSceneRef scene, float side, float height) {
@@ -71,7 +71,7 @@ double ray_nanoseconds(EmbreeSceneRef scene, float side, float height) {
     context.ray_seed = rng.next_uint();
     EmbreeRayHit ray = make_ray_hit(side * vec3(x, 0.0f, z) + vec3(0.0f, 1.5f * height, 0.0f),
                                     glm::normalize(vec3(std::cos(turn), -0.02f - down * down, std::sin(turn))));
-    rtcIntersect1(scene, &context.embree, &ray);
+    trace_nearest(scene, context.embree, ray);
   }
   return 1e9 * watch.cpu() / kRays;
 }
@@ -80,11 +80,11 @@ double ray_nanoseconds(EmbreeSceneRef scene, float side, float height) {
 Result<void> measure(const char* folder, size_t count, const HostScene& kind) {
   FARFIELD_TRY_LET(const auto device, make_embree_device());
   const EmbreeScene scene = new_scene(device.get());
-  rtcSetSceneFlags(scene.get(), kind.flags);
-  rtcSetSceneBuildQuality(scene.get(), kind.quality);
+  set_build(scene.get(), kind.build);
   RuntimeOptions options;
   options.budget_bytes = uint64_t{64} << 30;
   options.forced_lambda = 100.0f;  // the root
+  options.scene_bytes_per_instance = kind.bytes_per_instance;
   FARFIELD_TRY_LET(auto runtime, Runtime::create(device.get(), options));
   FARFIELD_TRY_LET(const auto asset, runtime->open_asset(folder));
   glm::vec3 lower, upper;
