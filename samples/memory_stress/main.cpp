@@ -122,7 +122,7 @@ struct Forest {
       local_to_world[3] = side * vec3(x - 0.5f, 0.0f, z - 0.5f) - scale * vec3(0.0f, kind.bounds.lower.y, 0.0f);
       host::or_fail(runtime->add_instance(kind.asset, local_to_world));
     }
-    const float nearest = 0.01f * side, farthest = 1.5f * side;
+    const float nearest = 0.5f * side / std::sqrt(static_cast<float>(count)), farthest = 1.5f * side;
     for (size_t i = 0; i < kFrames; ++i) {
       const float time = static_cast<float>(i) / (kFrames - 1);
       const vec3 towards_camera = glm::normalize(vec3(0.3f, 0.3f, 1.0f));
