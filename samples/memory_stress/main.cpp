@@ -30,8 +30,9 @@ using glm::vec3;
 namespace {
 
 constexpr const char* kUsage = "usage: memory_stress ASSETS [INSTANCES [BUDGET_MIB [FOLDER]]]";
-constexpr int kWidth = 96, kHeight = 54, kMaxDepth = 4;
+constexpr int kWidth = 96, kHeight = 54, kSamples = 4, kMaxDepth = 8;
 constexpr float kFieldOfView = 0.6f;  // vertical, rad
+constexpr float kCrowding = 2.0f;     // sizes of things per distance between them
 constexpr size_t kFrames = 6;
 constexpr int kPatience = 2000;  // pictures until the loader has to have brought all that a frame needs
 constexpr double kShares[] = {0.5, 0.25, 0.1, 0.05, 0.02, 0.01};
@@ -112,7 +113,7 @@ struct Forest {
   /// On a square as large as the instances need, of any size between a half and the whole, and the cameras above it.
   void scatter(size_t count) {
     const float sum = kinds_.back().up_to;
-    const float side = std::sqrt(static_cast<float>(count) * static_cast<float>(kinds_.size()) / sum);
+    const float side = std::sqrt(static_cast<float>(count) * static_cast<float>(kinds_.size()) / sum) / kCrowding;
     farfield::Rng rng(1);
     for (size_t i = 0; i < count; ++i) {
       const float which = sum * rng.next(), scale = 0.5f + 0.5f * rng.next(), x = rng.next(), z = rng.next();
@@ -122,7 +123,8 @@ struct Forest {
       local_to_world[3] = side * vec3(x - 0.5f, 0.0f, z - 0.5f) - scale * vec3(0.0f, kind.bounds.lower.y, 0.0f);
       host::or_fail(runtime->add_instance(kind.asset, local_to_world));
     }
-    const float nearest = 0.5f * side / std::sqrt(static_cast<float>(count)), farthest = 1.5f * side;
+    host::add_ground(device, scene, vec3(0.0f), side);
+    const float nearest = kCrowding * 0.5f * side / std::sqrt(static_cast<float>(count)), farthest = 1.5f * side;
     for (size_t i = 0; i < kFrames; ++i) {
       const float time = static_cast<float>(i) / (kFrames - 1);
       const vec3 towards_camera = glm::normalize(vec3(0.3f, 0.3f, 1.0f));
@@ -140,8 +142,7 @@ farfield::Result<farfield::PlanSummary> plan(Forest& forest, size_t frame) {
 }
 
 /// The light that comes along one path: an even sky's, and what glows.
-vec3 light_along_path(const Forest& forest, const host::Camera& camera, int x, int y) {
-  farfield::Rng rng(static_cast<uint64_t>(y) * kWidth + static_cast<uint64_t>(x));
+vec3 light_along_path(const Forest& forest, const host::Camera& camera, int x, int y, farfield::Rng& rng) {
   vec3 origin = camera.eye, direction = camera.direction(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
   vec3 throughput(1.0f), light(0.0f);
   farfield::RayContext context;
@@ -151,26 +152,36 @@ vec3 light_along_path(const Forest& forest, const host::Camera& camera, int x, i
     RTCRayHit ray = host::make_ray(origin, direction);
     context.ray_seed = rng.next_uint();
     rtcIntersect1(forest.scene, &context.embree, &ray);
-    if (ray.hit.geomID != forest.runtime->geometry_id()) return light + throughput;
-    const farfield::Interaction interaction = forest.runtime->interaction(ray, context);
-    light += throughput * interaction.emission;
-    const farfield::ScatterSample sample = interaction.sample(rng);
-    throughput *= sample.weight;
+    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return light + throughput;
     context.cone_width += context.cone_spread * ray.ray.tfar;
-    context.cone_spread = interaction.next_cone_spread(sample, context.cone_spread);
-    context.set_origin(context.hit);
-    origin = interaction.ray_origin(sample.wi);
-    direction = sample.wi;
+    if (ray.hit.geomID == forest.runtime->geometry_id()) {
+      const farfield::Interaction interaction = forest.runtime->interaction(ray, context);
+      light += throughput * interaction.emission;
+      const farfield::ScatterSample sample = interaction.sample(rng);
+      throughput *= sample.weight;
+      context.cone_spread = interaction.next_cone_spread(sample, context.cone_spread);
+      context.set_origin(context.hit);
+      origin = interaction.ray_origin(sample.wi);
+      direction = sample.wi;
+    } else {  // the ground: Lambert's law
+      context.origin_instance = farfield::kNoInstance;
+      throughput *= host::kGroundAlbedo;
+      context.cone_spread += 0.25f;
+      origin = host::above_ground(ray);
+      direction = host::cosine_direction_up(rng);
+    }
   }
   return light;
 }
 
 Picture render(const Forest& forest, size_t frame, unsigned threads) {
-  Picture picture(static_cast<size_t>(kWidth) * kHeight);
+  Picture picture(static_cast<size_t>(kWidth) * kHeight, vec3(0.0f));
   host::for_each_row(kHeight, threads, [&](int y) {
     for (int x = 0; x < kWidth; ++x) {
-      picture[static_cast<size_t>(y) * kWidth + static_cast<size_t>(x)] =
-          light_along_path(forest, forest.cameras[frame], x, y);
+      const size_t pixel = static_cast<size_t>(y) * kWidth + static_cast<size_t>(x);
+      farfield::Rng rng(pixel);
+      for (int sample = 0; sample < kSamples; ++sample)
+        picture[pixel] += light_along_path(forest, forest.cameras[frame], x, y, rng) / static_cast<float>(kSamples);
     }
   });
   return picture;
