@@ -23,6 +23,7 @@
 #include "bake/slab_hull.h"
 #include "bake/volume_job.h"
 #include "base/file_io.h"
+#include "base/free_memory.h"
 #include "base/hash.h"
 #include "base/index.h"
 #include "base/result.h"
@@ -254,7 +255,7 @@ class Baker {
     source_order_ = order_surface(faces);
     const Surface ordered = reorder(faces, source_order_);
     LevelData level = pack_level(0, report_.manifest.base_resolution, ordered, source_order_, {}, {});
-    level.face_sggx = {};  // hits have the normals themselves
+    free_memory(level.face_sggx);  // hits have the normals themselves
     pack_source(source_, source_order_, ordered, level);
     auto done = store_level(level, level_report);
     level_report.write_seconds = watch.seconds();

@@ -9,6 +9,7 @@
 
 #include "bake/pack_colors.h"
 #include "base/check.h"
+#include "base/free_memory.h"
 #include "base/index.h"
 #include "base/parallel.h"
 #include "prefilter/edge_table.h"
@@ -184,7 +185,7 @@ void sort_along_curve(const Surface& surface, std::vector<Pair>& pairs) {
 
 template <typename T>
 void drop_if_all(std::vector<T>& values, const T& default_value) {
-  if (std::all_of(values.begin(), values.end(), [&](const T& v) { return v == default_value; })) values = {};
+  if (std::all_of(values.begin(), values.end(), [&](const T& v) { return v == default_value; })) free_memory(values);
 }
 
 template <typename Packed, typename Source, typename Pack>

@@ -9,6 +9,7 @@
 
 #include "base/hash.h"
 #include "base/result.h"
+#include "import/gltf_json.h"
 #include "import/read_file.h"
 
 namespace farfield {
@@ -16,9 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using tinygltf::Model;
-
-// tinygltf walks `extras` recursively: a deeper document could overflow the stack.
-constexpr int kMaxJsonDepth = 200;
 
 // What a file may require. The rest changes geometry or looks in ways that we would get wrong.
 constexpr std::string_view kKnownExtensions[] = {"EXT_mesh_gpu_instancing",
@@ -73,35 +71,6 @@ bool keep_encoded(tinygltf::Image* image, const int, std::string*, std::string*,
                   int size, void*) {
   if (image->bufferView < 0) image->image.assign(bytes, bytes + size);
   return true;
-}
-
-/// The JSON text of a .glb, or all of a .gltf.
-std::span<const unsigned char> json_text(std::span<const unsigned char> bytes, bool is_binary) {
-  if (!is_binary || bytes.size() < 20) return is_binary ? std::span<const unsigned char>{} : bytes;
-  uint32_t length = 0;
-  std::memcpy(&length, bytes.data() + 12, 4);
-  return bytes.subspan(20, std::min<size_t>(length, bytes.size() - 20));
-}
-
-bool is_too_deep(std::span<const unsigned char> json) {
-  int depth = 0;
-  bool in_string = false;
-  for (size_t i = 0; i < json.size(); ++i) {
-    const unsigned char c = json[i];
-    if (in_string) {
-      if (c == '\\')
-        ++i;
-      else if (c == '"')
-        in_string = false;
-    } else if (c == '"') {
-      in_string = true;
-    } else if (c == '{' || c == '[') {
-      if (++depth > kMaxJsonDepth) return true;
-    } else if (c == '}' || c == ']') {
-      --depth;
-    }
-  }
-  return false;
 }
 
 std::string first_line(const std::string& text) {
@@ -255,7 +224,7 @@ Result<ByteRange> byte_range(const GltfDocument& document, int view_index, uint6
   if (view_index < 0 || !is_index(view_index, model.bufferViews)) return document.bad(place + ": no such buffer view");
   const auto& view = model.bufferViews[static_cast<size_t>(view_index)];
   if (view.buffer < 0 || !is_index(view.buffer, model.buffers)) return document.bad(place + ": no such buffer");
-  const auto& buffer = model.buffers[static_cast<size_t>(view.buffer)].data;
+  FARFIELD_TRY_LET(const auto buffer, document.buffer_bytes(static_cast<size_t>(view.buffer)));
   if (view.byteOffset > buffer.size() || view.byteLength > buffer.size() - view.byteOffset) {
     return document.bad(
         fmt::format("{}: buffer view {} reaches past its buffer of {} bytes", place, view_index, buffer.size()));
@@ -330,10 +299,21 @@ Result<void> apply_sparse(const GltfDocument& document, const tinygltf::Accessor
   return {};
 }
 
-uint64_t total_buffer_bytes(const Model& model) {
-  uint64_t bytes = 0;
-  for (const auto& buffer : model.buffers) bytes += buffer.data.size();
+uint64_t total_buffer_bytes(const GltfDocument& document) {
+  uint64_t bytes = document.buffer_files->total_bytes();
+  for (const auto& buffer : document.model.buffers) bytes += buffer.data.size();
   return bytes;
+}
+
+/// The text for tinygltf, which would read all buffers: those in files of their own are taken out. What cannot be
+/// parsed stays as it is, for tinygltf to say why.
+Result<std::string> text_without_buffer_files(std::span<const unsigned char> bytes, const fs::path& path,
+                                              GltfBufferFiles& files) {
+  const auto as_it_is = [&] { return std::string(bytes.begin(), bytes.end()); };
+  auto json = parse_json(bytes);
+  if (!json) return as_it_is();
+  FARFIELD_TRY_LET(files, GltfBufferFiles::take_from(*json, path));
+  return files.empty() ? as_it_is() : json->dump();
 }
 
 }  // namespace
@@ -342,11 +322,23 @@ tl::unexpected<Error> GltfDocument::bad(const std::string& what) const {
   return make_error(ErrorCode::BadFile, fmt::format("{}: {}", name, what));
 }
 
+Result<std::span<const unsigned char>> GltfDocument::buffer_bytes(size_t buffer) const {
+  if (buffer_files->has(buffer)) return buffer_files->bytes(buffer);
+  return std::span<const unsigned char>(model.buffers[buffer].data);
+}
+
+std::vector<HashedFile> GltfDocument::files_read() const {
+  std::vector<HashedFile> all = files;
+  all.insert(all.end(), buffer_files->files_read().begin(), buffer_files->files_read().end());
+  return all;
+}
+
 Result<GltfDocument> open_gltf(std::span<const unsigned char> bytes, const fs::path& path) {
   GltfDocument document;
   document.name = path.string();
-  const bool is_binary = bytes.size() >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0;
-  if (is_too_deep(json_text(bytes, is_binary))) {
+  document.buffer_files = std::make_unique<GltfBufferFiles>();
+  const bool is_binary = is_binary_gltf(bytes);
+  if (is_too_deep(json_text(bytes))) {
     return document.bad(fmt::format("JSON is nested deeper than {} levels", kMaxJsonDepth));
   }
 
@@ -355,14 +347,16 @@ Result<GltfDocument> open_gltf(std::span<const unsigned char> bytes, const fs::p
   tinygltf::TinyGLTF loader;
   loader.SetImageLoader(keep_encoded, nullptr);
   loader.SetFsCallbacks({file_exists, tinygltf::ExpandFilePath, read_whole_file, nullptr, &access});
-  std::string error, warning;
+  std::string error, warning, text;
+  if (!is_binary) {
+    FARFIELD_TRY_LET(text, text_without_buffer_files(bytes, path, *document.buffer_files));
+  }
   bool ok = false;
   try {
-    const auto size = static_cast<unsigned int>(bytes.size());
+    const auto size = static_cast<unsigned int>(is_binary ? bytes.size() : text.size());
     const std::string base = fs::absolute(folder).string();
     ok = is_binary ? loader.LoadBinaryFromMemory(&document.model, &error, &warning, bytes.data(), size, base)
-                   : loader.LoadASCIIFromString(&document.model, &error, &warning,
-                                                reinterpret_cast<const char*>(bytes.data()), size, base);
+                   : loader.LoadASCIIFromString(&document.model, &error, &warning, text.data(), size, base);
   } catch (const std::exception& exception) {
     error = exception.what();
   }
@@ -420,8 +414,7 @@ Result<std::vector<double>> read_accessor(const GltfDocument& document, int inde
     }
   } else {
     // Zeros to be overwritten: no bytes back the count, so it is held against all bytes that there are.
-    if (accessor.count > total_buffer_bytes(document.model))
-      return document.bad(place + ": count is larger than the file");
+    if (accessor.count > total_buffer_bytes(document)) return document.bad(place + ": count is larger than the file");
     values.resize(accessor.count * static_cast<size_t>(components));
   }
   if (accessor.sparse.isSparse) {

@@ -6,21 +6,29 @@
 #include <tiny_gltf.h>
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 
 #include "base/hash.h"
 #include "base/result.h"
 #include "base/vec.h"
+#include "import/gltf_buffer_files.h"
 
 namespace farfield {
 
+/// One thread at a time: buffers are read when something in them is asked for.
 struct GltfDocument {
-  std::string name;  ///< the file's path, for messages
-  tinygltf::Model model;
+  std::string name;       ///< the file's path, for messages
+  tinygltf::Model model;  ///< without the bytes of buffer_files
   std::vector<std::string> warnings;
-  std::vector<HashedFile> files;  ///< the buffers and images in files of their own
+  std::vector<HashedFile> files;  ///< the images in files of their own, and the buffers of a .glb that are
+  std::unique_ptr<GltfBufferFiles> buffer_files;  ///< of a .gltf; not null
 
+  /// Errors: those of GltfBufferFiles::bytes().
+  Result<std::span<const unsigned char>> buffer_bytes(size_t buffer) const;
+  /// All files but the glTF file itself that were read so far.
+  std::vector<HashedFile> files_read() const;
   tl::unexpected<Error> bad(const std::string& what) const;
 };
 

@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 
+#include "base/free_memory.h"
 #include "base/result.h"
 #include "import/gltf_assemblies.h"
 #include "import/gltf_document.h"
@@ -168,6 +169,8 @@ class SceneReader {
     find_time_range();
     FARFIELD_TRY(find_assets(order));
     FARFIELD_TRY(place_everything(order));
+    if (!scene_.do_instances_move()) free_memory(scene_.in_node);
+    scene_.instances.shrink_to_fit();
     return std::move(scene_);
   }
 
@@ -426,7 +429,8 @@ class SceneReader {
       const mat4x3 in_node = to_affine(transforms[i]);
       const auto seen = first_seen(to_square(in_node));
       if (seen) {
-        scene_.instances.push_back({asset, mat4x3(1), name, index, data[i], in_node});
+        scene_.instances.push_back({asset, mat4x3(1), name, index, data[i]});
+        scene_.in_node.push_back(in_node);
         places_.push_back(*seen);
       } else {
         ++singular;
@@ -571,13 +575,14 @@ bool GltfScene::do_instances_move() const {
 }
 
 std::vector<GltfInstance> GltfScene::instances_at(double seconds) const {
+  if (in_node.empty()) return instances;
   const std::vector<dmat4> world = world_matrices(*this, seconds);
   std::vector<GltfInstance> placed;
   placed.reserve(instances.size());
-  for (const GltfInstance& instance : instances) {
-    const dmat4 to_world = world[instance.node] * to_square(instance.in_node);
+  for (size_t i = 0; i < instances.size(); ++i) {
+    const dmat4 to_world = world[instances[i].node] * to_square(in_node[i]);
     if (!is_invertible(to_world)) continue;
-    placed.push_back(instance);
+    placed.push_back(instances[i]);
     placed.back().to_world = to_affine(to_world, origin_world);
   }
   return placed;

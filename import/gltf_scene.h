@@ -41,7 +41,6 @@ struct GltfInstance {
   std::string name;    ///< of the node
   uint32_t node = 0;   ///< index into GltfScene::nodes
   InstanceData data;   ///< what the file says of it for the host
-  mat4x3 in_node{1};   ///< mesh space to the node's space: EXT_mesh_gpu_instancing shows a mesh many times in one node
 };
 
 /// A camera where it stands at some time. It looks along `forward`; right, up and forward are orthonormal (the node's
@@ -103,6 +102,9 @@ struct GltfScene {
   /// Of the default scene, in the order of a depth-first walk: all that are to be seen at some time, where they stand
   /// at time 0 or, if their transform is singular then (a plant that grows from nothing), as soon as it is not.
   std::vector<GltfInstance> instances;
+  /// Per instance mesh space to the node's space: EXT_mesh_gpu_instancing shows a mesh many times in one node. Empty if
+  /// no instance moves: a million of them take as much as many an asset.
+  std::vector<mat4x3> in_node;
   std::vector<GltfCamera> cameras;  ///< of the default scene, at time 0
   std::vector<GltfLight> lights;    ///< of the default scene
   std::vector<GltfNode> nodes;      ///< of the default scene, flattened, parents first

@@ -341,7 +341,6 @@ class GltfMeshReader {
 
   Result<SourceMesh> read(int mesh, int node) {
     mesh_.warnings = document_.warnings;
-    mesh_.source_files = document_.files;
     return with_warnings(read_all(mesh, node), mesh_.warnings);
   }
 
@@ -354,6 +353,7 @@ class GltfMeshReader {
     if (!mesh_.corner_uv.empty()) mesh_.corner_uv.resize(mesh_.corner_count(), no_uv());
     if (!mesh_.corner_color.empty()) mesh_.corner_color.resize(mesh_.corner_count(), vec4(1.0f));
     if (!mesh_.corner_normal.empty()) mesh_.corner_normal.resize(mesh_.corner_count(), vec3(0.0f));
+    mesh_.source_files = document_.files_read();
     return std::move(mesh_);
   }
 

@@ -4,27 +4,40 @@
 
 #include <filesystem>
 #include <map>
+#include <memory>
+#include <optional>
 
 #include "import/source_mesh.h"
 
 namespace farfield {
 
-/// The hashes of files that were read already, so that asking about each of many meshes reads their file once. Files
+class GltfParts;
+
+/// The hashes of what was read already, so that asking about each of many meshes reads their file once. Files
 /// are taken not to change meanwhile. One thread at a time.
 class FileHashes {
  public:
+  FileHashes();
+  ~FileHashes();
+  FileHashes(const FileHashes&) = delete;
+  FileHashes& operator=(const FileHashes&) = delete;
+
   /// Of the file's unpacked bytes. Errors: those of read_file().
   Result<uint64_t> of(const std::filesystem::path& path);
+  /// Of what a mesh, or a node and those below it, takes from a glTF file and those that it refers to. Nothing where
+  /// that cannot be told from the rest of the file.
+  std::optional<uint64_t> of_part(const std::filesystem::path& path, int mesh, int node);
 
  private:
   std::map<std::filesystem::path, Result<uint64_t>> known_;
+  std::map<std::filesystem::path, std::unique_ptr<GltfParts>> parts_;  ///< null: of no use
 };
 
 struct ImportOptions {
   int mesh =
       -1;  ///< glTF only: import this mesh alone, in its own space; -1: all nodes of the default scene, flattened
   int node = -1;  ///< glTF only: import all that this node of the file and those below show, in the node's own space
-  FileHashes* known_hashes = nullptr;  ///< hash_source() looks there first; null: it reads
+  FileHashes* known_hashes = nullptr;  ///< hashes are looked for there first; null: they read
 };
 
 /// Reads the file and those that it refers to. Content decides what a file is where it says so, its name otherwise.
@@ -34,8 +47,8 @@ struct ImportOptions {
 Result<SourceMesh> read_source(const std::filesystem::path& path, const ImportOptions& options = {});
 
 /// The source_hash that read_source() would give a source that still refers to `files`: of the bytes of the main file
-/// and of those, and of the options. Hashes without looking at what the bytes mean. Errors: those of reading the main
-/// file; the others may be missing.
+/// and of those, or of what a mesh or node takes from a glTF file, and of the options. Does not look at what the bytes
+/// mean. Errors: those of reading the main file; the others may be missing.
 Result<uint64_t> hash_source(const std::filesystem::path& path, const std::vector<HashedFile>& files,
                              const ImportOptions& options);
 

@@ -352,11 +352,13 @@ class SpeedUp {
   Bytes budget_;
 };
 
-tl::unexpected<Error> roots_do_not_fit(size_t assets, uint64_t budget_bytes, uint64_t needed) {
+tl::unexpected<Error> roots_do_not_fit(size_t assets, uint64_t budget_bytes, uint64_t fixed_bytes, uint64_t needed) {
   return make_error(ErrorCode::OutOfBudget,
-                    fmt::format("the budget of {} ({} bytes) is too small: the coarsest levels of {} assets alone "
-                                "need {} ({} bytes); raise the budget to at least that",
-                                format_bytes(budget_bytes), budget_bytes, assets, format_bytes(needed), needed));
+                    fmt::format("the budget of {} ({} bytes) is too small: instances and tables take {}, and with them "
+                                "the coarsest levels of {} assets alone need {} ({} bytes); raise the budget to at "
+                                "least that",
+                                format_bytes(budget_bytes), budget_bytes, format_bytes(fixed_bytes), assets,
+                                format_bytes(needed), needed));
 }
 
 void describe_error(std::span<const Choice> choices, const Draft& draft, Plan& plan) {
@@ -395,7 +397,7 @@ Result<Plan> plan_levels(std::span<const PlanAsset> assets, uint64_t budget_byte
   const Draft roots = draft_of(choices, [](const Choice& choice) { return choice.root(); });
   const Draft asked = draft_of(choices, [](const Choice& choice) { return choice.asked(); });
   const Bytes needed = roots.resident + roots.peak + fixed_bytes;
-  if (needed > budget_bytes) return roots_do_not_fit(assets.size(), budget_bytes, saturated(needed));
+  if (needed > budget_bytes) return roots_do_not_fit(assets.size(), budget_bytes, fixed_bytes, saturated(needed));
 
   const Bytes budget = budget_bytes - fixed_bytes;
   const Draft best = best_under(choices, roots, asked, budget);

@@ -67,6 +67,23 @@ std::vector<std::string> bake_command(const RenderOptions& options, const SceneB
   return command;
 }
 
+struct ReadyAsset {
+  fs::path folder;
+  Manifest manifest;
+};
+
+// The asset of a mesh, if it is up to date. For full detail the one with all levels will do: its level 0 is the same.
+std::optional<ReadyAsset> find_ready(const SceneBakeOptions& bake, const GltfScene& scene, size_t mesh,
+                                     FileHashes& hashes) {
+  const fs::path folder = asset_folder(bake, scene.meshes[mesh]);
+  if (auto found = find_up_to_date(bake.scene, folder, asset_bake_options(bake, scene, mesh, hashes)))
+    return ReadyAsset{folder, std::move(*found)};
+  if (!bake.source_only) return std::nullopt;
+  SceneBakeOptions whole = bake;
+  whole.source_only = false;
+  return find_ready(whole, scene, mesh, hashes);
+}
+
 void warn(const RenderOptions& options, const std::string& line) {
   if (options.warning) options.warning(line);
 }
@@ -131,11 +148,9 @@ Result<std::vector<fs::path>> find_or_bake_assets(const GltfScene& scene, const 
   FileHashes hashes;  // the scene is read once, however many meshes it has
   for (size_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {
     if (!in_use[mesh]) continue;
-    const fs::path folder = asset_folder(bake, scene.meshes[mesh]);
-    const auto found = find_up_to_date(options.scene, folder, asset_bake_options(bake, scene, mesh, hashes));
-    if (found) {
-      folders[mesh] = folder;
-      repeat_warnings(options, scene.meshes[mesh], *found);
+    if (auto found = find_ready(bake, scene, mesh, hashes)) {
+      folders[mesh] = std::move(found->folder);
+      repeat_warnings(options, scene.meshes[mesh], found->manifest);
     } else {
       missing.push_back(mesh);
     }

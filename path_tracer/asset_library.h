@@ -2,7 +2,7 @@
 // Where the baked assets of a scene lie, and baking those that are missing.
 //
 //   ASSETS/forest/small_maple.farfield          mesh "small_maple" of forest.glb
-//   ASSETS/forest/small_maple.source.farfield   its level 0 alone, for --full-detail
+//   ASSETS/forest/small_maple.source.farfield   its level 0 alone, for --full-detail where there is nothing else
 //
 // ASSETS is --assets, or "farfield-assets" in the scene's own folder.
 #pragma once

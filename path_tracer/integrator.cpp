@@ -291,8 +291,9 @@ float spot_falloff(const PointLight& light, const vec3& direction) {
   return t * t;  // as KHR_lights_punctual recommends
 }
 
-Result<EmbreeScene> make_scene(EmbreeDeviceRef device, Runtime& runtime) {
+Result<EmbreeScene> make_scene(EmbreeDeviceRef device, Runtime& runtime, bool is_small) {
   EmbreeScene scene = new_scene(device);
+  if (is_small) set_build(scene.get(), SceneBuild::Small);
   FARFIELD_TRY(runtime.attach(scene.get()));
   commit_scene(scene.get());
   FARFIELD_TRY(check_embree(device, "build the scene"));

@@ -64,8 +64,9 @@ struct TraceStats {
   uint64_t invalid_samples = 0;  ///< paths whose value was not finite; they count as black
 };
 
-/// A committed scene that holds the runtime's geometry and nothing else. Errors: those of Runtime::attach, Io (Embree).
-Result<EmbreeScene> make_scene(EmbreeDeviceRef device, Runtime& runtime);
+/// A committed scene that holds the runtime's geometry and nothing else; a small one takes less memory for its
+/// instances (kSmallSceneBytesPerInstance) and a little more time. Errors: those of Runtime::attach, Io (Embree).
+Result<EmbreeScene> make_scene(EmbreeDeviceRef device, Runtime& runtime, bool is_small = false);
 
 /// Renders `camera` into `film` (same size) on all threads of parallel_for. The image depends on the arguments alone,
 /// not on threads or time. The job reports from several threads at once and is polled for each tile of 16 x 16 pixels.

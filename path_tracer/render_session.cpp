@@ -13,8 +13,15 @@ namespace farfield {
 
 namespace {
 
-RuntimeOptions runtime_options(const RenderOptions& options) {
+// Whether instances would take so much of the budget that levels are worth more than fast rays among them.
+bool needs_small_scene(size_t instances, uint64_t budget_bytes) {
+  constexpr uint64_t kRecordBytes = 64, kLargestShare = 4;
+  return instances * (kRecordBytes + kSceneBytesPerInstance) > budget_bytes / kLargestShare;
+}
+
+RuntimeOptions runtime_options(const RenderOptions& options, bool has_small_scene) {
   RuntimeOptions runtime;
+  if (has_small_scene) runtime.scene_bytes_per_instance = kSmallSceneBytesPerInstance;
   runtime.budget_bytes = options.budget_bytes;
   runtime.blend = options.blend;
   runtime.pixel_error = options.pixel_error;
@@ -41,7 +48,8 @@ Result<std::unique_ptr<RenderSession>> RenderSession::open(EmbreeDeviceRef devic
                                                            std::span<const GltfInstance> instances,
                                                            const MaterialNames& names) {
   std::unique_ptr<RenderSession> session(new RenderSession);
-  FARFIELD_TRY_LET(auto runtime, Runtime::create(device, runtime_options(options)));
+  const bool is_small = needs_small_scene(instances.size(), options.budget_bytes);
+  FARFIELD_TRY_LET(auto runtime, Runtime::create(device, runtime_options(options, is_small)));
   session->runtime_ = std::move(runtime);
   session->ids_ = SceneIds(names);
 
@@ -57,7 +65,7 @@ Result<std::unique_ptr<RenderSession>> RenderSession::open(EmbreeDeviceRef devic
       return tl::unexpected(added.error());
     if (!names.empty()) session->ids_.add_instance(instance);
   }
-  FARFIELD_TRY_LET(auto scene, make_scene(device, *session->runtime_));
+  FARFIELD_TRY_LET(auto scene, make_scene(device, *session->runtime_, is_small));
   session->scene_ = std::move(scene);
   return session;
 }

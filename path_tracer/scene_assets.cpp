@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <system_error>
 
+#include "base/free_memory.h"
 #include "base/result.h"
 
 namespace farfield {
@@ -62,7 +63,7 @@ BakeOptions asset_bake_options(const SceneBakeOptions& options, const GltfScene&
 }
 
 Result<size_t> bake_scene_assets(const SceneBakeOptions& options) {
-  FARFIELD_TRY_LET(const auto scene, read_gltf_scene(options.scene, options.assemblies));
+  FARFIELD_TRY_LET(auto scene, read_gltf_scene(options.scene, options.assemblies));
   for (const std::string& warning : scene.warnings)
     if (options.warning) options.warning(warning);
   std::error_code error;
@@ -73,6 +74,7 @@ Result<size_t> bake_scene_assets(const SceneBakeOptions& options) {
   size_t failed = 0;
   FileHashes hashes;  // the scene is read once for them, however many assets it has
   const std::vector<size_t> numbers = numbers_to_bake(options, scene);
+  free_memory(scene.instances);  // a million take as much as a bake
   for (size_t i = 0; i < numbers.size(); ++i) {
     const GltfMesh& mesh = scene.meshes[numbers[i]];
     BakeOptions how = asset_bake_options(options, scene, numbers[i], hashes);

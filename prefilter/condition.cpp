@@ -8,6 +8,7 @@
 #include <cmath>
 #include <unordered_set>
 
+#include "base/free_memory.h"
 #include "base/hash.h"
 #include "base/index.h"
 #include "base/result.h"
@@ -220,7 +221,7 @@ void tidy_normals(SourceSurface& surface, std::vector<std::string>& warnings) {
     is_smooth |= std::abs(glm::dot(normal, own)) < kSameCosine;
   }
   if (unusable > 0) warnings.push_back(fmt::format("{} normals are not finite; ignored", unusable));
-  if (!is_smooth) surface.corner_normal = {};
+  if (!is_smooth) free_memory(surface.corner_normal);
 }
 
 /// One line each, and not a thousand of them.
@@ -240,10 +241,10 @@ Result<ImportedAsset> condition_mesh(SourceMesh& mesh, const std::string& name, 
   std::vector<vec3> positions;
   positions.reserve(mesh.positions.size());
   for (const dvec3& p : mesh.positions) positions.emplace_back(p - origin);
-  mesh.positions = {};
+  free_memory(mesh.positions);
   WeldResult welded = weld(positions, mesh.face_begin, mesh.corner_position, job);
   if (job.is_cancelled()) return cancelled();
-  positions = {};
+  free_memory(positions);
   if (100 * welded.near_welds > welded.positions.size()) {  // a few happen in any large mesh
     mesh.warnings.push_back(fmt::format("{} vertices joined with others within rounding of them", welded.near_welds));
   }

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/free_memory.h"
 #include "base/hash.h"
 #include "base/parallel_job.h"
 #include "base/result.h"
@@ -231,7 +232,7 @@ Result<SparseVolume> voxelize(const OpacityScene& geometry, const VoxelLattice& 
     if (of_brick.empty()) continue;
     volume.bricks.push_back({candidates.coordinates[i], candidates.masks[i], volume.voxels.size()});
     volume.voxels.insert(volume.voxels.end(), of_brick.begin(), of_brick.end());
-    of_brick = {};
+    free_memory(of_brick);
   }
   return volume;
 }

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <time.h>
+
+#include <optional>
 
 #include "bake/bake.h"
 #include "base/bytes.h"
 #include "base/parallel.h"
+#include "base/process_memory.h"
 #include "path_tracer/scene_assets.h"
 #include "tools/args.h"
 #include "tools/commands.h"
@@ -35,6 +39,36 @@ void print_summary(const BakeArguments& arguments, const BakeReport& report) {
              report.up_to_date ? "up to date" : fmt::format("baked in {:.1f} s", report.total_seconds));
 }
 
+/// CPU seconds of this process, all threads.
+double cpu_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+/// What each asset of a scene takes of this process; written after each, so that what was measured stays if the rest
+/// is not baked.
+class SceneReport {
+ public:
+  /// path: empty for none.
+  explicit SceneReport(std::string path) : path_(std::move(path)) {}
+
+  void begin() {
+    peak_.emplace();
+    cpu_before_ = cpu_seconds();
+  }
+  Result<void> end(const std::string& asset, const BakeReport& report) {
+    assets_.push_back({asset, cpu_seconds() - cpu_before_, peak_->peak_bytes(), report});
+    return path_.empty() ? Result<void>() : write_text_file(path_, scene_report_json(assets_));
+  }
+
+ private:
+  std::string path_;
+  std::optional<PeakMemory> peak_;
+  double cpu_before_ = 0;
+  std::vector<AssetReport> assets_;
+};
+
 /// On standard output a line before and after each asset, for whoever started this. Exit code 1 if one failed.
 Result<void> bake_scene(const BakeArguments& arguments) {
   ProgressLine progress;
@@ -59,8 +93,14 @@ Result<void> bake_scene(const BakeArguments& arguments) {
     progress.clear();
     print_warnings("bake", lines);
   };
-  options.begin = [&](const std::string& asset) { say("baking", asset); };
+  SceneReport measured(arguments.report);
+  Result<void> written;
+  options.begin = [&](const std::string& asset) {
+    say("baking", asset);
+    measured.begin();
+  };
   options.end = [&](const std::string& asset, const Result<BakeReport>& report) {
+    if (report && written) written = measured.end(asset, *report);
     if (report && arguments.warnings) warn(report->warnings);
     if (!report) {
       warn(report.error().warnings);
@@ -74,7 +114,7 @@ Result<void> bake_scene(const BakeArguments& arguments) {
   const auto failed = bake_scene_assets(options);
   progress.clear();
   if (!failed) return tl::unexpected(failed.error());
-  if (*failed == 0) return {};
+  if (*failed == 0) return written;
   return make_error(ErrorCode::Unsupported,
                     fmt::format("{}: {} of its assets cannot be baked", arguments.source, *failed));
 }
@@ -144,8 +184,7 @@ void add_bake_command(CLI::App& app, Action& action) {
       ->capture_default_str();
   command->add_flag("!--no-warnings", arguments->warnings,
                     "Leave what was ignored or guessed to the manifest, as render does, which says it itself");
-  command->add_option("--report", arguments->report, "Write what was done, with seconds per stage, as JSON")
-      ->excludes(scene);
+  command->add_option("--report", arguments->report, "Write what was done, with seconds per stage, as JSON");
   command->footer("Example:\n  farfield bake oak.obj.gz -o oak.farfield --finest-grid 512");
   command->callback([arguments, &action] { action = [arguments] { return run_bake(*arguments); }; });
 }

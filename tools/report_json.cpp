@@ -35,20 +35,32 @@ Json level_json(const LevelEntry& entry, const BakeReport& report) {
   return json;
 }
 
-}  // namespace
-
-std::string bake_report_json(const BakeReport& report) {
+Json report_json(const BakeReport& report) {
   Json levels = Json::array();
   for (const LevelEntry& entry : report.manifest.levels) levels.push_back(level_json(entry, report));
-  const Json json = {{"source", report.manifest.source},
-                     {"source_hash", to_hex(report.manifest.source_hash)},
-                     {"options", report.manifest.options},
-                     {"up_to_date", report.up_to_date},
-                     {"import_seconds", report.import_seconds},
-                     {"total_seconds", report.total_seconds},
-                     {"warnings", report.warnings},
-                     {"levels", levels}};
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return {{"source", report.manifest.source},
+          {"source_hash", to_hex(report.manifest.source_hash)},
+          {"options", report.manifest.options},
+          {"up_to_date", report.up_to_date},
+          {"import_seconds", report.import_seconds},
+          {"total_seconds", report.total_seconds},
+          {"warnings", report.warnings},
+          {"levels", levels}};
+}
+
+std::string to_text(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
+
+}  // namespace
+
+std::string bake_report_json(const BakeReport& report) { return to_text(report_json(report)); }
+
+std::string scene_report_json(const std::vector<AssetReport>& assets) {
+  Json json = Json::array();
+  for (const AssetReport& asset : assets) {
+    json.push_back({{"asset", asset.asset}, {"cpu_seconds", asset.cpu_seconds}, {"peak_bytes", asset.peak_bytes}});
+    json.back().update(report_json(asset.report));
+  }
+  return to_text({{"assets", json}});
 }
 
 }  // namespace farfield::tool

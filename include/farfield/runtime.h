@@ -57,13 +57,20 @@ enum class Severity : uint8_t { Info, Warning, Error };
 /// Receives the library's messages, each once. Called from any thread, never concurrently.
 using MessageSink = std::function<void(Severity, const std::string&)>;
 
+/// What the budget counts for an instance in the host's scene, the worst moment of rtcCommitScene() included: in a
+/// scene of Embree's defaults, and in one of RTC_BUILD_QUALITY_LOW, in which rays take about a tenth longer [measured:
+/// docs/results/scale.md].
+inline constexpr uint32_t kSceneBytesPerInstance = 120;
+inline constexpr uint32_t kSmallSceneBytesPerInstance = 64;
+
 struct RuntimeOptions {
   uint64_t budget_bytes = uint64_t{1} << 32;  ///< hard: mapped, heap and Embree bytes together, build peaks included
   Blend blend = Blend::Dissolve;
   Residency residency = Residency::Wait;
   float pixel_error = 1.0f;            ///< pixels: how wide the voxels of a level may look; the budget aside. > 0
   std::optional<float> forced_lambda;  ///< every ray sees this lambda, whatever its footprint; for evaluation
-  MessageSink messages;                ///< may be empty
+  uint32_t scene_bytes_per_instance = kSceneBytesPerInstance;  ///< of the scene that attach() will be given
+  MessageSink messages;                                        ///< may be empty
 };
 
 struct AssetId {
@@ -128,8 +135,9 @@ class FARFIELD_API Runtime {
   /// the empty box: lower is infinite, upper minus infinite.
   void bounds(AssetId asset, glm::vec3& lower, glm::vec3& upper) const;
 
-  /// Adds an instance. local_to_world: affine, invertible, finite. data: for the host, see instance_data(); 24 bytes
-  /// per instance of the budget once an instance has other data than the default. Errors: InvalidArgument.
+  /// Adds an instance: 64 bytes of the budget, and those of the host's scene. local_to_world: affine, invertible,
+  /// finite. data: for the host, see instance_data(); 24 bytes more for each instance once one has other data than the
+  /// default. Errors: InvalidArgument.
   Result<InstanceId> add_instance(AssetId asset, const glm::mat4x3& local_to_world, const InstanceData& data = {});
   /// What add_instance() was given for the instance that was hit; the default for what is no hit of ours. Safe from any
   /// thread, as interaction() is.

@@ -1,21 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-// What does an instance take, and how long do a plan and the host's commit, with a million of them and more? For
-// docs/results/scale.md.
+// What does an instance take, how long do a plan and the host's commit, with a million of them and more, and what do
+// the flags of the host's scene change? For docs/results/scale.md. Rays look down at the field from anywhere above it;
+// each instance shows its root.
 //
 //   build/release/bin/instance_figures ASSET.farfield [COUNT...]     without counts: 100000 and 1000000
+#include <farfield/random.h>
 #include <farfield/runtime.h>
 #include <fmt/format.h>
+#include <malloc.h>
+#include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
-#include <limits>
 #include <vector>
 
 #include "base/embree.h"
+#include "base/process_memory.h"
+#include "base/result.h"
 
 namespace farfield {
 namespace {
@@ -37,57 +41,91 @@ class Stopwatch {
   double cpu_ = cpu_now();
 };
 
-uint64_t resident_bytes() {
-  uint64_t pages = 0, resident = 0;
-  std::ifstream("/proc/self/statm") >> pages >> resident;
-  return resident * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
+/// Anywhere on a square field, turned and of any size between 0.8 and 1.25; neighbours touch.
+glm::mat4x3 place(Rng& rng, float side) {
+  const float x = rng.next() - 0.5f, z = rng.next() - 0.5f, turn = 6.2831853f * rng.next();
+  const float size = 0.8f + 0.45f * rng.next(), c = size * std::cos(turn), s = size * std::sin(turn);
+  return {{c, 0, s}, {0, size, 0}, {-s, 0, c}, {side * x, 0, side * z}};
 }
 
-/// The i-th of `count` places, on a square lattice as wide apart as the asset is.
-glm::mat4x3 place(size_t i, size_t count, float distance) {
-  const auto side = static_cast<size_t>(std::ceil(std::sqrt(static_cast<double>(count))));
-  const auto along = [&](size_t k) { return distance * (static_cast<float>(k) - 0.5f * static_cast<float>(side)); };
-  glm::mat4x3 local_to_world(1.0f);
-  local_to_world[3] = glm::vec3(along(i % side), 0.0f, along(i / side));
-  return local_to_world;
+/// How a host may build its scene.
+struct HostScene {
+  const char* name;
+  SceneBuild build;
+  uint32_t bytes_per_instance = kSceneBytesPerInstance;
+};
+constexpr HostScene kHostScenes[] = {{"default", SceneBuild::Default},
+                                     {"compact", SceneBuild::Compact},
+                                     {"low quality", SceneBuild::Small, kSmallSceneBytesPerInstance},
+                                     {"high quality", SceneBuild::HighQuality}};
+
+/// Nanoseconds of a ray from anywhere above a square field, steeply or along it.
+double ray_nanoseconds(EmbreeSceneRef scene, float side, float height) {
+  constexpr int kRays = 200'000;
+  Rng rng(1);
+  const Stopwatch watch;
+  for (int i = 0; i < kRays; ++i) {
+    const float x = rng.next() - 0.5f, z = rng.next() - 0.5f, turn = 6.2831853f * rng.next(), down = rng.next();
+    RayContext context;
+    context.path_seed = rng.next_uint();
+    context.ray_seed = rng.next_uint();
+    EmbreeRayHit ray = make_ray_hit(side * vec3(x, 0.0f, z) + vec3(0.0f, 1.5f * height, 0.0f),
+                                    glm::normalize(vec3(std::cos(turn), -0.02f - down * down, std::sin(turn))));
+    trace_nearest(scene, context.embree, ray);
+  }
+  return 1e9 * watch.cpu() / kRays;
 }
 
-Result<void> measure(EmbreeDeviceRef device, const char* folder, size_t count) {
-  const EmbreeScene scene = new_scene(device);
+/// Prints a row. In a process of its own: what one measurement leaves in the heap is not the next one's.
+Result<void> measure(const char* folder, size_t count, const HostScene& kind) {
+  FARFIELD_TRY_LET(const auto device, make_embree_device());
+  const EmbreeScene scene = new_scene(device.get());
+  set_build(scene.get(), kind.build);
   RuntimeOptions options;
   options.budget_bytes = uint64_t{64} << 30;
-  auto runtime = Runtime::create(device, options);
-  if (!runtime) return tl::unexpected(runtime.error());
-  const auto asset = (*runtime)->open_asset(folder);
-  if (!asset) return tl::unexpected(asset.error());
+  options.forced_lambda = 100.0f;  // the root
+  options.scene_bytes_per_instance = kind.bytes_per_instance;
+  FARFIELD_TRY_LET(auto runtime, Runtime::create(device.get(), options));
+  FARFIELD_TRY_LET(const auto asset, runtime->open_asset(folder));
   glm::vec3 lower, upper;
-  (*runtime)->bounds(*asset, lower, upper);
-  const float distance = std::max(upper.x - lower.x, upper.z - lower.z);
+  runtime->bounds(asset, lower, upper);
+  const float side = std::max(upper.x - lower.x, upper.z - lower.z) * std::sqrt(static_cast<float>(count));
 
-  const uint64_t rss_before = resident_bytes(), accounted_before = (*runtime)->stats().accounted_bytes;
+  malloc_trim(0);
+  const uint64_t rss_before = resident_set_bytes(), accounted_before = runtime->stats().accounted_bytes;
+  const PeakMemory peak;
   const Stopwatch adding;
-  for (size_t i = 0; i < count; ++i) {
-    const auto added = (*runtime)->add_instance(*asset, place(i, count, distance));
-    if (!added) return tl::unexpected(added.error());
-  }
+  Rng rng(2);
+  for (size_t i = 0; i < count; ++i) FARFIELD_TRY(runtime->add_instance(asset, place(rng, side)));
   const double add_seconds = adding.cpu();
-  (*runtime)->set_cameras({{glm::vec3(0.0f, upper.y, 0.0f), 0.0f, 0.001f}});
   const Stopwatch planning;
-  const auto plan = (*runtime)->plan_frame();
-  if (!plan) return tl::unexpected(plan.error());
+  FARFIELD_TRY(runtime->plan_frame());
   const double plan_seconds = planning.cpu();
   const Stopwatch committing;
-  const auto geometry = (*runtime)->attach(scene.get());
-  if (!geometry) return tl::unexpected(geometry.error());
+  FARFIELD_TRY(runtime->attach(scene.get()));
   commit_scene(scene.get());
+  const double commit_seconds = committing.cpu(), commit_wall = committing.wall();
+  malloc_trim(0);
   const auto each = [&](uint64_t after, uint64_t before) {
-    return static_cast<double>(after - before) / static_cast<double>(count);
+    return (static_cast<double>(after) - static_cast<double>(before)) / static_cast<double>(count);
   };
-  fmt::print("| {} | {:.0f} | {:.0f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |\n", count,
-             each((*runtime)->stats().accounted_bytes, accounted_before), each(resident_bytes(), rss_before),
-             add_seconds, plan_seconds, committing.cpu(), committing.wall());
+  fmt::print("| {} | {} | {:.0f} | {:.0f} | {:.0f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.0f} |\n", count, kind.name,
+             each(runtime->stats().accounted_bytes, accounted_before), each(resident_set_bytes(), rss_before),
+             each(peak.peak_bytes(), rss_before), add_seconds, plan_seconds, commit_seconds, commit_wall,
+             ray_nanoseconds(scene.get(), side, upper.y));
   std::fflush(stdout);
   return {};
+}
+
+int measure_in_child(const char* folder, size_t count, const HostScene& kind) {
+  const pid_t child = fork();
+  if (child == 0) {
+    const auto done = measure(folder, count, kind);
+    if (!done) fmt::print(stderr, "instance_figures: {}\n", done.error().message);
+    _exit(done ? 0 : 1);
+  }
+  int status = 1;
+  return child > 0 && waitpid(child, &status, 0) == child && status == 0 ? 0 : 1;
 }
 
 }  // namespace
@@ -101,18 +139,11 @@ int main(int argc, char** argv) {
   std::vector<size_t> counts;
   for (int i = 2; i < argc; ++i) counts.push_back(std::strtoull(argv[i], nullptr, 10));
   if (counts.empty()) counts = {100'000, 1'000'000};
-  const auto device = farfield::make_embree_device();
-  if (!device) {
-    fmt::print(stderr, "instance_figures: {}\n", device.error().message);
-    return 1;
-  }
   fmt::print(
-      "| instances | accounted bytes each | RSS bytes each | add, CPU s | plan, CPU s | commit, CPU s | commit, s |\n"
-      "|---|---|---|---|---|---|---|\n");
-  for (const size_t count : counts) {
-    if (const auto done = farfield::measure(device->get(), argv[1], count); !done) {
-      fmt::print(stderr, "instance_figures: {}\n", done.error().message);
-      return 1;
-    }
-  }
+      "| instances | host's scene | accounted bytes each | RSS bytes each | at the peak | add, CPU s | plan, CPU s | "
+      "commit, CPU s | commit, s | ray, ns |\n|---|---|---|---|---|---|---|---|---|---|\n");
+  std::fflush(stdout);
+  for (const size_t count : counts)
+    for (const farfield::HostScene& kind : farfield::kHostScenes)
+      if (farfield::measure_in_child(argv[1], count, kind) != 0) return 1;
 }

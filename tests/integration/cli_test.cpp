@@ -498,6 +498,15 @@ TEST_F(WholeRoad, RenderAndShotOfAScene) {
 
   render.insert(render.end(), {"--full-detail"});
   expect_quiet_success(farfield(render));
+  const std::string of_whole_asset = contents(path("frame.exr"));
+  const auto is_source = [](const fs::path& name) { return name.string().find(".source.") != std::string::npos; };
+  for (const auto& entry : fs::directory_iterator(path("assets/scene")))
+    EXPECT_FALSE(is_source(entry.path().filename())) << "baked again for its level 0";
+  fs::remove_all(path("assets"));
+  expect_quiet_success(farfield(render));
+  EXPECT_TRUE(std::ranges::all_of(fs::directory_iterator(path("assets/scene")),
+                                  [&](const auto& entry) { return is_source(entry.path().filename()); }));
+  EXPECT_EQ(contents(path("frame.exr")), of_whole_asset);
 }
 
 /// Two settings of a scene's bush against full detail, small and fast.
@@ -585,12 +594,20 @@ TEST(SceneBake, SaysOfEachAssetHowItWentAndBakesTheOthers) {
   const fs::path folder = fresh_folder("scene_bake");
   const std::string scene = (folder / "scene.glb").string(), library = (folder / "assets").string();
   write_scene_with_a_torn_mesh(scene);
-  const ProcessOutput bake = farfield({"bake", scene, "--scene", "-o", library, "--finest-grid", "16"});
+  const std::string report = (folder / "report.json").string();
+  const ProcessOutput bake =
+      farfield({"bake", scene, "--scene", "-o", library, "--finest-grid", "16", "--report", report});
   EXPECT_EQ(bake.exit_code, 1);
   EXPECT_EQ(bake.out, "baking whole\nready whole\nbaking torn\nfailed torn\n");
   EXPECT_NE(bake.err.find("farfield bake: warning: torn: "), std::string::npos) << bake.err;
   EXPECT_NE(bake.err.find("1 of its assets cannot be baked"), std::string::npos) << bake.err;
   EXPECT_EQ(farfield({"verify", library + "/whole.farfield"}).exit_code, 0);
+  const Json assets = Json::parse(contents(report))["assets"];
+  ASSERT_EQ(assets.size(), 1u) << "of what was baked";
+  EXPECT_EQ(assets[0]["asset"], "whole");
+  EXPECT_GT(assets[0]["cpu_seconds"], 0.0);
+  EXPECT_GT(assets[0]["peak_bytes"], 1u << 20);
+  EXPECT_FALSE(assets[0]["levels"].empty());
 }
 
 TEST(SceneBake, PartsShareTheAssets) {

@@ -265,6 +265,24 @@ TEST_F(PathTraceScene, BackgroundIsLeftOutWhenTransparent) {
   EXPECT_EQ(film.image().pixel(0, 0)[1], 0.0f);
 }
 
+TEST_F(PathTraceScene, ASmallSceneOfManyInstancesShowsTheSame) {
+  for (int i = 0; i < 500; ++i) {
+    mat4x3 place(1.0f);
+    place[3] = 0.7f * vec3(i % 10, i / 10 % 10, -2 - i / 100);
+    ASSERT_TRUE(runtime_->add_instance(AssetId{0}, place));
+  }
+  TraceOptions options;
+  options.samples_per_pixel = 4;
+  std::vector<float> values[2];
+  for (const bool is_small : {false, true}) {
+    scene_ = std::move(*make_scene(device_.get(), *runtime_, is_small));
+    Film film(64, 64);
+    ASSERT_TRUE(trace(camera_at(20, 64), film, options));
+    values[is_small] = film.image().values;
+  }
+  EXPECT_EQ(values[0], values[1]);
+}
+
 TEST_F(PathTraceScene, CancelStopsEarly) {
   Film film(256, 256);
   TraceOptions options;
