@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "bake/bake.h"
@@ -72,21 +73,23 @@ double deviation(const Estimate& estimate) { return std::abs(estimate.value) / e
 constexpr double kSigmas = 4.5;
 
 /// Nothing is wrong with the level, and the figures do not say so; and they are sharp enough to have seen 50 % (at 16
-/// samples) or 6 % (at 1024).
-void expect_nothing_found(const ErrorMetrics& m, int samples) {
+/// samples) or 6 % (at 1024). Returns how many rms are said to be known: of a right judge 6 % by chance (65 of 1080
+/// over 40 seeds).
+int expect_nothing_found(const ErrorMetrics& m, int samples) {
   EXPECT_LT(deviation(m.occlusion_error), kSigmas);
   for (const Estimate& bias : m.color_bias) EXPECT_LT(deviation(bias), kSigmas);
-  for (const Bounded& rms : m.color_rms) EXPECT_FALSE(rms.value) << *rms.value << " at " << samples;
   EXPECT_FALSE(m.color_error.value) << *m.color_error.value;
   EXPECT_EQ(m.color_error.low, 0.0);
   EXPECT_LT(m.color_error.high, 2.0 / std::sqrt(samples)) << samples;
   EXPECT_LE(m.color_error.high, m.color_error_raw);
+  return static_cast<int>(std::ranges::count_if(m.color_rms, [](const Bounded& rms) { return rms.value.has_value(); }));
 }
 
 TEST(Evaluate, ALevelAgainstItselfIsNotWrongAtAnyNumberOfSamples) {
   const test::TemporaryFolder folder;
   bake_bush(folder);
   EvaluateOptions options = against_itself(folder, 2, {Light::Daylight, Light::Front, Light::Sky});
+  int found = 0;
   for (const int samples : {16, 64, 256, 1024}) {
     options.samples_per_pixel = samples;
     const auto evaluation = evaluate(options);
@@ -95,7 +98,7 @@ TEST(Evaluate, ALevelAgainstItselfIsNotWrongAtAnyNumberOfSamples) {
     const LevelEvaluation& level = evaluation->levels[0];
     EXPECT_EQ(level.samples_per_pixel, samples);
     ASSERT_EQ(level.lights.size(), 3u);
-    for (const LightEvaluation& light : level.lights) expect_nothing_found(light.errors, samples);
+    for (const LightEvaluation& light : level.lights) found += expect_nothing_found(light.errors, samples);
     // Both are the same triangles: rays meet them at the same depth.
     EXPECT_EQ(level.depth.camera.mean.value, 0.0);
     EXPECT_EQ(level.depth.camera.distance.value, 0.0);
@@ -108,6 +111,7 @@ TEST(Evaluate, ALevelAgainstItselfIsNotWrongAtAnyNumberOfSamples) {
     EXPECT_FALSE(manifest->levels[0].errors->color_error.value);
     EXPECT_EQ(manifest->levels[0].errors->color_error.high, level.errors.color_error.high);
   }
+  EXPECT_LE(found, 8);  // of 36: by chance 1 of 1000 times
 }
 
 TEST(Evaluate, KeepsNothingInTheAssetWithoutDaylight) {
