@@ -258,7 +258,7 @@ ASSETS = {"planks_00": lambda: planks(0), "planks_02": lambda: planks(0.02), "pl
 
 
 def main():
-    if len(sys.argv) < 2:
+    if len(sys.argv) < 2 or sys.argv[1].startswith("-"):
         sys.exit(__doc__)
     folder, names = Path(sys.argv[1]), sys.argv[2:] or list(ASSETS)
     unknown = [name for name in names if name not in ASSETS]
