@@ -25,7 +25,4 @@ Result<std::vector<TradePicture>> trade_pictures(const Trade& trade, const std::
 /// The page: advice, tables, plots, pictures; well-formed as XML.
 std::string trade_page(const Trade& trade, const std::vector<TradePicture>& pictures);
 
-/// Bytes as RFC 4648 writes them.
-std::string base64(const std::string& bytes);
-
 }  // namespace farfield

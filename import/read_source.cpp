@@ -84,12 +84,14 @@ Result<uint64_t> FileHashes::of(const fs::path& path) {
   return known_.emplace(path, hash).first->second;
 }
 
-std::optional<uint64_t> FileHashes::of_part(const fs::path& path, int mesh, int node) {
+std::optional<uint64_t> FileHashes::of_part(const fs::path& path, int mesh, int node, const Bytes* bytes) {
   if (mesh < 0 && node < 0) return std::nullopt;
   const auto [known, is_new] = parts_.try_emplace(path);
   if (is_new) {
-    const auto bytes = read_file(path);
-    auto parts = bytes && is_gltf(*bytes, path) ? GltfParts::open(*bytes, path) : std::nullopt;
+    Bytes own;
+    if (!bytes) own = read_file(path).value_or(Bytes());
+    const Bytes& all = bytes ? *bytes : own;
+    auto parts = is_gltf(all, path) ? GltfParts::open(all, path) : std::nullopt;
     if (parts) known->second = std::make_unique<GltfParts>(std::move(*parts));
   }
   return known->second ? known->second->hash(mesh, node) : std::nullopt;
@@ -99,7 +101,7 @@ Result<SourceMesh> read_source(const fs::path& path, const ImportOptions& option
   FARFIELD_TRY_LET(const auto bytes, read_file(path));
   FileHashes own;
   FileHashes& hashes = options.known_hashes ? *options.known_hashes : own;
-  const auto part = hashes.of_part(path, options.mesh, options.node);
+  const auto part = hashes.of_part(path, options.mesh, options.node, &bytes);
   FARFIELD_TRY_LET(auto mesh, read_as_named(bytes, path, options));
   const uint64_t hash = part ? *part : combine(hash_values<unsigned char>(bytes), mesh.source_files);
   mesh.source_hash = with_options(hash, options);

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "import/source_mesh.h"
 
@@ -26,7 +27,9 @@ class FileHashes {
   Result<uint64_t> of(const std::filesystem::path& path);
   /// Of what a mesh, or a node and those below it, takes from a glTF file and those that it refers to. Nothing where
   /// that cannot be told from the rest of the file.
-  std::optional<uint64_t> of_part(const std::filesystem::path& path, int mesh, int node);
+  /// bytes: the file's unpacked ones, if they are at hand.
+  std::optional<uint64_t> of_part(const std::filesystem::path& path, int mesh, int node,
+                                  const std::vector<unsigned char>* bytes = nullptr);
 
  private:
   std::map<std::filesystem::path, Result<uint64_t>> known_;

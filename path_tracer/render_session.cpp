@@ -4,9 +4,9 @@
 #include <malloc.h>
 
 #include <chrono>
-#include <ctime>
 
 #include "base/process_memory.h"
+#include "base/process_time.h"
 #include "base/result.h"
 
 namespace farfield {
@@ -32,13 +32,6 @@ RuntimeOptions runtime_options(const RenderOptions& options, bool has_small_scen
     if (sink) sink(text);
   };
   return runtime;
-}
-
-/// Of all threads since the process began.
-double process_cpu_seconds() {
-  timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 }  // namespace

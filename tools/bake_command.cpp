@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
-#include <time.h>
 
 #include <optional>
 
@@ -8,6 +7,7 @@
 #include "base/bytes.h"
 #include "base/parallel.h"
 #include "base/process_memory.h"
+#include "base/process_time.h"
 #include "path_tracer/scene_assets.h"
 #include "tools/args.h"
 #include "tools/commands.h"
@@ -39,13 +39,6 @@ void print_summary(const BakeArguments& arguments, const BakeReport& report) {
              report.up_to_date ? "up to date" : fmt::format("baked in {:.1f} s", report.total_seconds));
 }
 
-/// CPU seconds of this process, all threads.
-double cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
 /// What each asset of a scene takes of this process; written after each, so that what was measured stays if the rest
 /// is not baked.
 class SceneReport {
@@ -55,10 +48,10 @@ class SceneReport {
 
   void begin() {
     peak_.emplace();
-    cpu_before_ = cpu_seconds();
+    cpu_before_ = process_cpu_seconds();
   }
   Result<void> end(const std::string& asset, const BakeReport& report) {
-    assets_.push_back({asset, cpu_seconds() - cpu_before_, peak_->peak_bytes(), report});
+    assets_.push_back({asset, process_cpu_seconds() - cpu_before_, peak_->peak_bytes(), report});
     return path_.empty() ? Result<void>() : write_text_file(path_, scene_report_json(assets_));
   }
 

@@ -91,12 +91,6 @@ void add_level_flags(CLI::App* command, RenderOptions& options) {
 
 namespace {
 
-void set_files(RenderArguments& arguments) {
-  arguments.options.scene = arguments.scene;
-  arguments.options.assets = arguments.assets;
-  arguments.options.environment = arguments.environment;
-}
-
 /// "progress 0.42 frame 60 (3/7)": what is done, as lines on standard output, ten a second at most. Any thread.
 class ProgressLines {
  public:
@@ -115,6 +109,12 @@ class ProgressLines {
 };
 
 }  // namespace
+
+void set_files(RenderArguments& arguments) {
+  arguments.options.scene = arguments.scene;
+  arguments.options.assets = arguments.assets;
+  arguments.options.environment = arguments.environment;
+}
 
 Result<RenderReport> run_with_progress(std::string_view command, RenderArguments& arguments, const RenderTask& task) {
   const ThreadLimit limit(arguments.threads);

@@ -25,6 +25,9 @@ void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std:
 /// Adds how coarse levels are, by budget, pixel error and bake, where the sun stands, and what else is written.
 void add_level_flags(CLI::App* command, RenderOptions& options);
 
+/// Puts the files that the flags named into the options.
+void set_files(RenderArguments& arguments);
+
 using RenderTask = std::function<Result<RenderReport>(const RenderOptions&)>;
 
 /// Runs `task` as `command` ("render", "shot") with the parsed options, progress on a terminal, and Ctrl-C; prints

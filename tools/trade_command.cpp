@@ -69,10 +69,8 @@ Result<void> run_trade(TradeArguments& arguments) {
   const ThreadLimit limit(arguments.threads);
   ProgressLine progress;
   TradeOptions& options = arguments.trade;
+  set_files(arguments);
   options.render = arguments.options;
-  options.render.scene = arguments.scene;
-  options.render.assets = arguments.assets;
-  options.render.environment = arguments.environment;
   options.render.job = {[&](double done, const std::string& stage) { progress.update(done, stage); },
                         &catch_interrupts()};
   options.render.warning = [&](const std::string& line) {

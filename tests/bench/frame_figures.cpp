@@ -8,7 +8,6 @@
 // Mean: of the picture with levels, less that of full detail, red, green, blue. Rms: of the pixels' luminance, noise
 // included; noise: the same between two full-detail pictures of other seeds.
 #include <fmt/format.h>
-#include <time.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,6 +16,7 @@
 
 #include "base/embree.h"
 #include "base/parallel.h"
+#include "base/process_time.h"
 #include "base/result.h"
 #include "import/gltf_scene.h"
 #include "path_tracer/asset_library.h"
@@ -25,13 +25,6 @@
 
 namespace farfield {
 namespace {
-
-/// Of this process, all threads.
-double cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 double median(std::vector<double> values) {
   std::ranges::sort(values);
@@ -73,18 +66,18 @@ struct Way {
 
   Result<void> open(EmbreeDeviceRef device, const GltfScene& scene) {
     FARFIELD_TRY_LET(const auto folders, find_or_bake_assets(scene, options));
-    const double before = cpu_seconds();
+    const double before = process_cpu_seconds();
     FARFIELD_TRY_LET(session, RenderSession::open(device, options, folders, scene.instances, {}));
-    fmt::print(stderr, "opened in {:.1f} CPU s\n", cpu_seconds() - before);
+    fmt::print(stderr, "opened in {:.1f} CPU s\n", process_cpu_seconds() - before);
     return {};
   }
   Result<Image> render(const Camera& camera, const Lights& lights, uint64_t seed) {
     RenderOptions seeded = options;
     seeded.trace.seed = seed;
     Film film(options.width, options.height);
-    const double before = cpu_seconds();
+    const double before = process_cpu_seconds();
     FARFIELD_TRY_LET(last, session->render(camera, lights, seeded, film, {}));
-    cpu.push_back(cpu_seconds() - before);
+    cpu.push_back(process_cpu_seconds() - before);
     return film.image();
   }
 };

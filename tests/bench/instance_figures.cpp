@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 #include <malloc.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -19,6 +18,7 @@
 
 #include "base/embree.h"
 #include "base/process_memory.h"
+#include "base/process_time.h"
 #include "base/result.h"
 
 namespace farfield {
@@ -28,17 +28,11 @@ namespace {
 class Stopwatch {
  public:
   double wall() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_).count(); }
-  double cpu() const { return cpu_now() - cpu_; }
+  double cpu() const { return process_cpu_seconds() - cpu_; }
 
  private:
-  static double cpu_now() {
-    timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-  }
-
   std::chrono::steady_clock::time_point wall_ = std::chrono::steady_clock::now();
-  double cpu_ = cpu_now();
+  double cpu_ = process_cpu_seconds();
 };
 
 /// Anywhere on a square field, turned and of any size between 0.8 and 1.25; neighbours touch.

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/base64.h"
 #include "base/random.h"
 #include "base/vec.h"
 #include "tests/support/gltf_files.h"
@@ -41,18 +42,6 @@ std::vector<LeafCorners> make_trunk() {
   for (int i = 0; i < 6; ++i)
     sides.push_back({corner(i, 0.0f), corner(i, 1.5f), corner(i + 1, 1.5f), corner(i + 1, 0.0f)});
   return sides;
-}
-
-std::string base64(const std::string& bytes) {
-  const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    const size_t have = std::min<size_t>(3, bytes.size() - i);
-    uint32_t group = 0;
-    for (size_t j = 0; j < 3; ++j) group = group << 8 | (j < have ? static_cast<uint8_t>(bytes[i + j]) : 0u);
-    for (size_t j = 0; j < 4; ++j) text += j <= have ? digits[group >> (18 - 6 * j) & 63] : '=';
-  }
-  return text;
 }
 
 }  // namespace

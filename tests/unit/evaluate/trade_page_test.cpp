@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
+#include "base/base64.h"
 #include "evaluate/trade_json.h"
 #include "tests/support/sample_trade.h"
 
