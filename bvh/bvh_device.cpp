@@ -3,6 +3,7 @@
 
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <thread>
 #include <utility>
 
@@ -26,6 +27,27 @@ Result<std::unique_ptr<BvhDevice>> BvhDevice::create() {
   FARFIELD_TRY_LET(device->device_, make_embree_device(is_limited ? static_cast<int>(limit) : 0));
   set_memory_monitor(device->handle(), on_memory, device.get());
   return device;
+}
+
+Result<MeasuredScene> build_measured_scene(BvhDevice& device, const std::function<std::vector<EmbreeGeometry>()>& make,
+                                           std::string_view task) {
+  const std::lock_guard lock(device.build_mutex());
+  const uint64_t bytes_before = device.bytes();
+  device.reset_peak();
+  forget_embree_error(device.handle());  // not ours
+
+  MeasuredScene result;
+  const std::vector<EmbreeGeometry> geometries = make();
+  result.scene = build_static_scene(device.handle(), geometries);
+  FARFIELD_TRY(check_embree(device.handle(), task));
+
+  const auto made = static_cast<uint64_t>(
+      std::ranges::count_if(geometries, [](const EmbreeGeometry& geometry) { return geometry != nullptr; }));
+  const uint64_t bytes_after = device.bytes();
+  result.bytes =
+      bytes_after - std::min(bytes_before, bytes_after) + kSceneOverheadBytes + made * kGeometryOverheadBytes;
+  result.build_peak_bytes = device.peak_bytes() - bytes_after;
+  return result;
 }
 
 }  // namespace farfield
