@@ -204,7 +204,7 @@ bool InstanceGeometry::intersect_morph(const Visit& visit, uint64_t seed, Embree
   made.is_volume = found->is_volume;
   made.is_coarser = found->is_coarser;
   made.element = found->element;
-  made.barycentric[0] = ray_hit.hit.u, made.barycentric[1] = ray_hit.hit.v;
+  made.barycentric[0] = found->barycentric.x, made.barycentric[1] = found->barycentric.y;
   return true;
 }
 

@@ -23,42 +23,59 @@ constexpr float kFadingCell = 2;  // coarse resolutions
 constexpr uint64_t kFadingSalt = 0x66616465;
 constexpr uint64_t kCoarseFlightSalt = 0x636f61727365;
 
-/// Faces of one geometry: triangles with the vertices that they use.
+uvec3 corners_of(const LevelView& level, uint32_t element) { return level.quads[element / 2].face(element % 2); }
+uint32_t sides(const LevelView& level, uint32_t quad) { return level.quads[quad].is_pair() ? 2 : 1; }
+
+/// Set in an element: a quad of two faces was hit, and which of them is known from where.
+constexpr uint32_t kEitherFace = 1u << 31;
+
+/// Faces of one geometry, with the vertices that they use: quads where they stay, triangles where they move (Embree
+/// has no fast quads that move).
 struct MorphFaces {
   std::vector<uint32_t> elements;
-  std::vector<uvec3> corners;
+  std::vector<Quad> quads;
+  std::vector<uvec3> triangles;
   std::vector<vec3> start, end;  ///< positions at t = 0 and 1; `end` only of what moves
 
   uint64_t bytes() const {
-    return elements.size() * (sizeof(uint32_t) + sizeof(uvec3)) + (start.size() + end.size()) * sizeof(vec3);
+    return elements.size() * (sizeof(uint32_t) + sizeof(Quad)) + (start.size() + end.size()) * sizeof(vec3);
   }
 };
 
-uvec3 corners_of(const LevelView& level, uint32_t element) { return level.quads[element / 2].face(element % 2); }
-
-/// Adds faces of a level to a geometry, with vertices of its own.
+/// Adds faces of a level to a geometry.
 class FaceAdder {
  public:
   FaceAdder(const LevelView& level, MorphFaces& faces)
       : level_(level), faces_(faces), number_(level.positions.size(), kNotYet) {}
 
-  /// `ends`: where the level's vertices move to; empty: nowhere.
-  void add(uint32_t element, std::span<const vec3> ends) {
-    uvec3 corners = corners_of(level_, element);
-    for (int c = 0; c < 3; ++c) {
-      uint32_t& number = number_[corners[c]];
-      if (number == kNotYet) {
-        number = static_cast<uint32_t>(faces_.start.size());
-        faces_.start.push_back(level_.positions[corners[c]]);
-        if (!ends.empty()) faces_.end.push_back(ends[corners[c]]);
-      }
-      corners[c] = number;
-    }
+  void add_quad(uint32_t quad) {
+    const Quad& corners = level_.quads[quad];
+    faces_.elements.push_back(2 * quad | (corners.is_pair() ? kEitherFace : 0));
+    faces_.quads.push_back({vertex(corners.v0), vertex(corners.v1), vertex(corners.v2), vertex(corners.v3)});
+  }
+  /// One of a quad's faces.
+  void add_face(uint32_t element) {
+    const uvec3 corners = corners_of(level_, element);
     faces_.elements.push_back(element);
-    faces_.corners.push_back(corners);
+    faces_.quads.push_back({vertex(corners.x), vertex(corners.y), vertex(corners.z), vertex(corners.z)});
+  }
+  /// One that moves; `ends`: where the level's vertices move to.
+  void add_moving_face(uint32_t element, std::span<const vec3> ends) {
+    const uvec3 corners = corners_of(level_, element);
+    faces_.elements.push_back(element);
+    faces_.triangles.emplace_back(vertex(corners.x, ends), vertex(corners.y, ends), vertex(corners.z, ends));
   }
 
  private:
+  uint32_t vertex(uint32_t of_level, std::span<const vec3> ends = {}) {
+    uint32_t& number = number_[of_level];
+    if (number != kNotYet) return number;
+    number = static_cast<uint32_t>(faces_.start.size());
+    faces_.start.push_back(level_.positions[of_level]);
+    if (!ends.empty()) faces_.end.push_back(ends[of_level]);
+    return number;
+  }
+
   static constexpr uint32_t kNotYet = 0xffffffffu;
   const LevelView& level_;
   MorphFaces& faces_;
@@ -74,23 +91,18 @@ std::vector<vec3> ends_of(const LevelView& fine, const LevelView& coarse) {
   return ends;
 }
 
-/// Calls visit(element, face) for all faces of a level.
-template <typename Visit>
-void for_each_face(const LevelView& level, Visit&& visit) {
-  for (uint32_t quad = 0; quad < level.quads.size(); ++quad) {
-    const uint32_t first = level.quad_first_face[quad];
-    visit(2 * quad, first);
-    if (level.quads[quad].is_pair()) visit(2 * quad + 1, first + 1);
-  }
-}
-
 EmbreeGeometry make_geometry(EmbreeDeviceRef device, const MorphFaces& faces) {
   if (faces.elements.empty()) return {};
-  EmbreeGeometry geometry = new_triangles(device);
-  if (!faces.end.empty()) set_time_steps(geometry.get(), 2);
-  copy_array(geometry.get(), std::span(faces.corners));
+  const bool moves = !faces.end.empty();
+  EmbreeGeometry geometry = moves ? new_triangles(device) : new_quads(device);
+  if (moves) {
+    set_time_steps(geometry.get(), 2);
+    copy_array(geometry.get(), std::span(faces.triangles));
+    copy_array(geometry.get(), std::span(faces.end), 1);
+  } else {
+    copy_array(geometry.get(), std::span(faces.quads));
+  }
   copy_array(geometry.get(), std::span(faces.start));
-  if (!faces.end.empty()) copy_array(geometry.get(), std::span(faces.end), 1);
   return geometry;
 }
 
@@ -128,21 +140,42 @@ struct TracedMorph::SortedFaces {
     const std::vector<vec3> ends = ends_of(fine, coarse);
     std::vector<uint8_t> is_reached(face_count(coarse), 0);
     FaceAdder staying(fine, of[kStaying]), moving(fine, of[kMoving]), fading_in(coarse, of[kFadingIn]);
-    const auto moves = [&](uint32_t vertex) { return ends[vertex] != fine.positions[vertex]; };
-    for_each_face(fine, [&](uint32_t element, uint32_t face) {
+    const auto face_moves = [&](uint32_t element, uint32_t target) {
       const uvec3 corners = corners_of(fine, element);
-      const bool fades = targets[face] == kMorphVoxelized;
-      some_fade_out |= fades;
-      if (targets[face] < is_reached.size()) is_reached[targets[face]] = 1;
-      if (!fades && (moves(corners.x) || moves(corners.y) || moves(corners.z))) {
-        moving.add(element, ends);
-      } else {
-        staying.add(element, {});
+      const auto moves = [&](uint32_t vertex) { return ends[vertex] != fine.positions[vertex]; };
+      return target != kMorphVoxelized && (moves(corners.x) || moves(corners.y) || moves(corners.z));
+    };
+    for (uint32_t quad = 0; quad < fine.quads.size(); ++quad) {
+      const std::span<const uint32_t> quad_targets = targets.subspan(fine.quad_first_face[quad], sides(fine, quad));
+      uint32_t moving_sides = 0;
+      for (uint32_t side = 0; side < quad_targets.size(); ++side) {
+        const uint32_t target = quad_targets[side];
+        some_fade_out |= target == kMorphVoxelized;
+        if (target < is_reached.size()) is_reached[target] = 1;
+        moving_sides |= uint32_t{face_moves(2 * quad + side, target)} << side;
       }
-    });
-    for_each_face(coarse, [&](uint32_t element, uint32_t face) {
-      if (!is_reached[face]) fading_in.add(element, {});
-    });
+      if (moving_sides == 0) {
+        staying.add_quad(quad);
+        continue;
+      }
+      for (uint32_t side = 0; side < quad_targets.size(); ++side) {
+        if (moving_sides >> side & 1) {
+          moving.add_moving_face(2 * quad + side, ends);
+        } else {
+          staying.add_face(2 * quad + side);
+        }
+      }
+    }
+    for (uint32_t quad = 0; quad < coarse.quads.size(); ++quad) {
+      const uint8_t* reached = &is_reached[coarse.quad_first_face[quad]];
+      if (!reached[0] && (sides(coarse, quad) == 1 || !reached[1])) {
+        fading_in.add_quad(quad);
+        continue;
+      }
+      for (uint32_t side = 0; side < sides(coarse, quad); ++side) {
+        if (!reached[side]) fading_in.add_face(2 * quad + side);
+      }
+    }
     table_bytes = ends.size() * (sizeof(vec3) + 2 * sizeof(uint32_t)) + coarse.positions.size() * sizeof(uint32_t) +
                   is_reached.size();
   }
@@ -209,6 +242,13 @@ Result<LevelCost> measure_morph(const LevelView& fine, const LevelView& coarse) 
 
 // --- Rays ------------------------------------------------------------------------------------------------------------
 
+/// Which face was hit, and where on it.
+TracedMorph::FaceHit TracedMorph::face_of(const EmbreeHit& hit) const {
+  const uint32_t element = elements_[hit.geomID][hit.primID];
+  if (!(element & kEitherFace)) return {element, vec2(hit.u, hit.v)};
+  return {(element ^ kEitherFace) + quad_side(hit.u, hit.v), face_barycentric(hit.u, hit.v)};
+}
+
 /// Whether a hit counts: it may be half there, in a gap, or clear.
 bool TracedMorph::stops(const EmbreeFilterArguments& args) const {
   const auto& context = *reinterpret_cast<const RayContext*>(args.context);
@@ -216,7 +256,7 @@ bool TracedMorph::stops(const EmbreeFilterArguments& args) const {
   const auto& hit = *reinterpret_cast<const EmbreeHit*>(args.hit);
   const bool is_new = hit.geomID == kFadingIn;
   const TracedLevel& level = is_new ? *coarse_ : *fine_;
-  const uint32_t element = elements_[hit.geomID][hit.primID];
+  const auto [element, barycentric] = face_of(hit);
   const uint32_t face = level.face_of(element / 2, element % 2);
   const uint32_t target = is_new ? kMorphVoxelized : coarse_face_[face];
   const float t = ray.time;
@@ -230,7 +270,7 @@ bool TracedMorph::stops(const EmbreeFilterArguments& args) const {
   if (becomes_face) gap = mix(gap, gap_of(coarse_->view, target), t);
   if (gap > 0 && path_number(context, ray, kGapCell * level.view.header.resolution, 0) < gap) return false;
 
-  float opacity = opacity_at(level, context, ray, element / 2, face, vec2(hit.u, hit.v));
+  float opacity = opacity_at(level, context, ray, element / 2, face, barycentric);
   if (becomes_face && !coarse_->view.face_opacity.empty()) {
     opacity = mix(opacity, unpack_unorm8(coarse_->view.face_opacity[target]), t);
   }
@@ -259,14 +299,14 @@ std::optional<MorphHit> TracedMorph::intersect(EmbreeRayHit& ray_hit, EmbreeCont
   if (built_.scene) {
     const AtTime scope(ray_hit.ray, t);
     if (trace_nearest(built_.scene.get(), context, ray_hit)) {
-      const unsigned geometry = ray_hit.hit.geomID;
-      result = MorphHit{false, geometry == kFadingIn, elements_[geometry][ray_hit.hit.primID]};
+      const auto [element, barycentric] = face_of(ray_hit.hit);
+      result = MorphHit{false, ray_hit.hit.geomID == kFadingIn, element, barycentric};
     }
   }
   bool is_coarser = false;
   if (const auto collision = first_collision(local_ray(ray_hit.ray), t, seed, is_coarser)) {
     ray_hit.ray.tfar = collision->t;
-    result = MorphHit{true, is_coarser, collision->payload};
+    result = MorphHit{true, is_coarser, collision->payload, {}};
   }
   return result;
 }

@@ -22,6 +22,7 @@ struct MorphHit {
   bool is_volume;
   bool is_coarser;   ///< `element` is of the coarser level, else of the finer
   uint32_t element;  ///< 2 * quad + side, or payload of a voxel
+  vec2 barycentric;  ///< weights of the face's second and third corner
 };
 
 /// A morph in memory. Immutable; any thread. Does not move: its scene refers to it.
@@ -58,6 +59,11 @@ class TracedMorph {
   friend Result<LevelCost> measure_morph(const LevelView& fine, const LevelView& coarse);
 
   std::optional<VolumeHit> first_collision(const LocalRay& ray, float t, uint64_t seed, bool& is_coarser) const;
+  struct FaceHit {
+    uint32_t element;
+    vec2 barycentric;
+  };
+  FaceHit face_of(const EmbreeHit& hit) const;
   bool stops(const EmbreeFilterArguments& args) const;
   static void filter(const EmbreeFilterArguments* args);
 
