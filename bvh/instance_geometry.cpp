@@ -59,7 +59,8 @@ class InLocalSpace {
   vec3 direction_;
 };
 
-uint64_t flight_seed(const RayContext& context, uint32_t instance) { return mix64(context.ray_seed, instance); }
+/// Random bits of a ray in an instance.
+uint64_t bits_of_ray(const RayContext& context, uint32_t instance) { return mix64(context.ray_seed, instance); }
 
 glm::dmat3 linear_part(const mat4x3& m) { return {glm::dvec3(m[0]), glm::dvec3(m[1]), glm::dvec3(m[2])}; }
 
@@ -166,7 +167,7 @@ bool InstanceGeometry::enter(uint32_t instance, const EmbreeRay& ray, const RayC
 }
 
 /// The nearest hit on a level, and what the record has of it. False: none, and ray_hit's ids are not to be trusted.
-bool InstanceGeometry::intersect_level(const Visit& visit, uint64_t seed, EmbreeRayHit& ray_hit,
+bool InstanceGeometry::intersect_level(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
                                        EmbreeContext& embree_context, HitRecord& made) {
   const TracedLevel& level = *visit.level;
   RTCHit& hit = ray_hit.hit;
@@ -179,7 +180,7 @@ bool InstanceGeometry::intersect_level(const Visit& visit, uint64_t seed, Embree
   if (!level.volume.is_empty()) {
     LocalRay up_to_surface = visit.ray;
     up_to_surface.t_far = ray_hit.ray.tfar;
-    if (const auto collision = level.volume.first_collision(up_to_surface, seed)) {
+    if (const auto collision = level.volume.first_collision(up_to_surface, flight_seed(ray_bits, level.slot))) {
       ray_hit.ray.tfar = collision->t;
       made.is_volume = true;
       made.element = collision->payload;
@@ -194,10 +195,10 @@ bool InstanceGeometry::intersect_level(const Visit& visit, uint64_t seed, Embree
 }
 
 /// The same on a morph.
-bool InstanceGeometry::intersect_morph(const Visit& visit, uint64_t seed, EmbreeRayHit& ray_hit,
+bool InstanceGeometry::intersect_morph(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
                                        EmbreeContext& embree_context, HitRecord& made) {
   const InLocalSpace scope(ray_hit.ray, visit.ray);
-  const auto found = visit.morph->intersect(ray_hit, embree_context, visit.choice.blend, seed);
+  const auto found = visit.morph->intersect(ray_hit, embree_context, visit.choice.blend, ray_bits);
   if (!found) return false;
   made.level_slot = static_cast<uint8_t>(visit.choice.slot);
   made.blend = visit.choice.blend;
@@ -217,8 +218,8 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
   const unsigned outer_id = hit.geomID;
   HitRecord made;
   const bool is_hit = visit.morph
-                          ? intersect_morph(visit, flight_seed(context, instance), ray_hit, *embree_context, made)
-                          : intersect_level(visit, flight_seed(context, instance), ray_hit, *embree_context, made);
+                          ? intersect_morph(visit, bits_of_ray(context, instance), ray_hit, *embree_context, made)
+                          : intersect_level(visit, bits_of_ray(context, instance), ray_hit, *embree_context, made);
   if (!is_hit) {
     hit.geomID = outer_id;
     return false;
@@ -249,14 +250,16 @@ bool InstanceGeometry::occluded(uint32_t instance, EmbreeRay& ray, const RayCont
   if (!enter(instance, ray, context, visit)) return false;
   if (visit.morph) {
     const InLocalSpace scope(ray, visit.ray);
-    return visit.morph->occluded(ray, *embree_context, visit.choice.blend, flight_seed(context, instance));
+    return visit.morph->occluded(ray, *embree_context, visit.choice.blend, bits_of_ray(context, instance));
   }
   if (visit.level->scene.handle()) {
     const InLocalSpace scope(ray, visit.ray);
     if (trace_occlusion(visit.level->scene.handle(), *embree_context, ray)) return true;
   }
   const BrickVolume& volume = visit.level->volume;
-  if (volume.is_empty() || !volume.first_collision(visit.ray, flight_seed(context, instance))) return false;
+  if (volume.is_empty() ||
+      !volume.first_collision(visit.ray, flight_seed(bits_of_ray(context, instance), visit.level->slot)))
+    return false;
   ray.tfar = -kInfinity;
   return true;
 }

@@ -68,10 +68,10 @@ class InstanceGeometry {
   static void occluded_callback(const RTCOccludedFunctionNArguments* args);
 
   struct Visit;
-  static bool intersect_level(const Visit& visit, uint64_t seed, EmbreeRayHit& ray_hit, EmbreeContext& embree_context,
-                              HitRecord& made);
-  static bool intersect_morph(const Visit& visit, uint64_t seed, EmbreeRayHit& ray_hit, EmbreeContext& embree_context,
-                              HitRecord& made);
+  static bool intersect_level(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
+                              EmbreeContext& embree_context, HitRecord& made);
+  static bool intersect_morph(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
+                              EmbreeContext& embree_context, HitRecord& made);
   bool enter(uint32_t instance, const EmbreeRay& ray, const RayContext& context, Visit& visit) const;
   bool intersect(uint32_t instance, unsigned geometry_id, EmbreeRayHit& ray_hit, const RayContext& context,
                  EmbreeContext* embree_context, HitRecord* record) const;

@@ -60,6 +60,14 @@ struct TracedLevel {
   TracedLevel() = default;
 };
 
+/// What free flights in a level's volume draw from, for a ray's own random bits. Neighbouring levels have nothing to do
+/// with each other, and a morph between two flies in each as rays do that see it alone: a path changes no more than it
+/// must.
+inline uint64_t flight_seed(uint64_t ray_bits, uint32_t slot) {
+  constexpr uint64_t kOddSalt = 0x6f646473;
+  return slot % 2 == 0 ? ray_bits : ray_bits ^ kOddSalt;
+}
+
 /// The side of a quad's diagonal that Embree's u and v are on, and the weights of that face's second and third corner.
 inline uint32_t quad_side(float u, float v) { return u + v > 1.0f ? 1 : 0; }
 inline vec2 face_barycentric(float u, float v) { return quad_side(u, v) ? vec2(1 - u, 1 - v) : vec2(u, v); }

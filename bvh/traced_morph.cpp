@@ -21,7 +21,6 @@ namespace {
 
 constexpr float kFadingCell = 2;  // coarse resolutions
 constexpr uint64_t kFadingSalt = 0x66616465;
-constexpr uint64_t kCoarseFlightSalt = 0x636f61727365;
 
 uvec3 corners_of(const LevelView& level, uint32_t element) { return level.quads[element / 2].face(element % 2); }
 uint32_t sides(const LevelView& level, uint32_t quad) { return level.quads[quad].is_pair() ? 2 : 1; }
@@ -283,18 +282,18 @@ void TracedMorph::filter(const EmbreeFilterArguments* args) {
 }
 
 /// In the sum of both volumes.
-std::optional<VolumeHit> TracedMorph::first_collision(const LocalRay& ray, float t, uint64_t seed,
+std::optional<VolumeHit> TracedMorph::first_collision(const LocalRay& ray, float t, uint64_t ray_bits,
                                                       bool& is_coarser) const {
-  std::optional<VolumeHit> hit = fine_->volume.first_collision(ray, seed, 1 - t);
+  std::optional<VolumeHit> hit = fine_->volume.first_collision(ray, flight_seed(ray_bits, fine_->slot), 1 - t);
   LocalRay up_to_hit = ray;
   if (hit) up_to_hit.t_far = hit->t;
-  const auto of_coarser = coarse_->volume.first_collision(up_to_hit, seed ^ kCoarseFlightSalt, t);
+  const auto of_coarser = coarse_->volume.first_collision(up_to_hit, flight_seed(ray_bits, coarse_->slot), t);
   is_coarser = of_coarser.has_value();
   return of_coarser ? of_coarser : hit;
 }
 
 std::optional<MorphHit> TracedMorph::intersect(EmbreeRayHit& ray_hit, EmbreeContext& context, float t,
-                                               uint64_t seed) const {
+                                               uint64_t ray_bits) const {
   std::optional<MorphHit> result;
   if (built_.scene) {
     const AtTime scope(ray_hit.ray, t);
@@ -304,20 +303,20 @@ std::optional<MorphHit> TracedMorph::intersect(EmbreeRayHit& ray_hit, EmbreeCont
     }
   }
   bool is_coarser = false;
-  if (const auto collision = first_collision(local_ray(ray_hit.ray), t, seed, is_coarser)) {
+  if (const auto collision = first_collision(local_ray(ray_hit.ray), t, ray_bits, is_coarser)) {
     ray_hit.ray.tfar = collision->t;
     result = MorphHit{true, is_coarser, collision->payload, {}};
   }
   return result;
 }
 
-bool TracedMorph::occluded(EmbreeRay& ray, EmbreeContext& context, float t, uint64_t seed) const {
+bool TracedMorph::occluded(EmbreeRay& ray, EmbreeContext& context, float t, uint64_t ray_bits) const {
   if (built_.scene) {
     const AtTime scope(ray, t);
     if (trace_occlusion(built_.scene.get(), context, ray)) return true;
   }
   bool is_coarser = false;
-  if (!first_collision(local_ray(ray), t, seed, is_coarser)) return false;
+  if (!first_collision(local_ray(ray), t, ray_bits, is_coarser)) return false;
   ray.tfar = -std::numeric_limits<float>::infinity();
   return true;
 }

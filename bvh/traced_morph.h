@@ -42,10 +42,10 @@ class TracedMorph {
   uint32_t coarse_face(uint32_t fine_face) const { return coarse_face_[fine_face]; }
 
   /// The nearest hit of a ray in local space at t, with ray_hit's tfar and normal set; none: ray_hit is as before, but
-  /// for geomID and primID. seed: of free flights.
-  std::optional<MorphHit> intersect(EmbreeRayHit& ray_hit, EmbreeContext& context, float t, uint64_t seed) const;
+  /// for geomID and primID. ray_bits: see flight_seed().
+  std::optional<MorphHit> intersect(EmbreeRayHit& ray_hit, EmbreeContext& context, float t, uint64_t ray_bits) const;
   /// Whether there is any hit; the ray's tfar is -infinity then.
-  bool occluded(EmbreeRay& ray, EmbreeContext& context, float t, uint64_t seed) const;
+  bool occluded(EmbreeRay& ray, EmbreeContext& context, float t, uint64_t ray_bits) const;
 
   /// What the BVH and the tables hold, and what else making them from the files of these levels takes.
   LevelCost cost(const LevelView& fine_level, const LevelView& coarse_level) const;
@@ -58,7 +58,7 @@ class TracedMorph {
                                                    const LevelView& coarse_level);
   friend Result<LevelCost> measure_morph(const LevelView& fine, const LevelView& coarse);
 
-  std::optional<VolumeHit> first_collision(const LocalRay& ray, float t, uint64_t seed, bool& is_coarser) const;
+  std::optional<VolumeHit> first_collision(const LocalRay& ray, float t, uint64_t ray_bits, bool& is_coarser) const;
   struct FaceHit {
     uint32_t element;
     vec2 barycentric;

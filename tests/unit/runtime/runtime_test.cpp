@@ -759,9 +759,8 @@ std::vector<LevelData> swelling_sphere() {
   for (uint32_t f = 0; f < face_count(view_of(levels[0])); ++f) levels[1].morph_face.push_back(f);
   levels[2].morph_vertex.assign(levels[1].positions.size(), kMorphVoxelized);
   levels[2].morph_face.assign(face_count(view_of(levels[1])), kMorphVoxelized);
-  test::set_volume(levels[2], ivec3(1), vec3(-1.6f), [](int x, int y, int z) {
-    return glm::length(vec3(x, y, z) - 3.5f) < 3.0f ? 2.0f : 0.0f;
-  });
+  test::set_volume(levels[2], ivec3(1), vec3(-1.6f),
+                   [](int x, int y, int z) { return glm::length(vec3(x, y, z) - 3.5f) < 3.0f ? 2.0f : 0.0f; });
   test::set_diffuse(levels[0], vec3(0.8f, 0.2f, 0.2f));
   test::set_diffuse(levels[1], vec3(0.2f, 0.2f, 0.8f));
   test::set_diffuse(levels[2], vec3(0.2f, 0.2f, 0.8f));
