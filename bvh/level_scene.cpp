@@ -36,10 +36,8 @@ Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, 
 }
 
 LevelCost level_cost(const LevelView& level, const LevelScene& scene) {
-  // Checking the file has mapped all of it. What is not given back stays mapped and so never faults again, which would
-  // bring its neighbours back.
   const LevelFileSizes file = level_file_sizes(level);
-  return {file.mapped_bytes - file.build_only_bytes + scene.bytes(), file.build_only_bytes + scene.build_peak_bytes()};
+  return {file.memory_bytes - file.build_only_bytes + scene.bytes(), file.build_only_bytes + scene.build_peak_bytes()};
 }
 
 Result<LevelCost> measure_level_scene(BvhDevice& device, const LevelView& level) {

@@ -21,10 +21,10 @@ class LevelScene {
  public:
   LevelScene() = default;
   /// Builds on the calling thread alone, so that the same level always takes the same bytes. The level's arrays are
-  /// shared, not copied: they stay mapped until this is destroyed, but only this call reads them. Four bytes after the
-  /// last position must be readable (level files see to that), because Embree loads vertices 16 bytes at a time.
-  /// `filter`, if there is one, is asked about every hit, with `user`. Holds device.build_mutex(). Errors: Io (out of
-  /// memory, or what else Embree says).
+  /// shared, not copied: they stay where they are until this is destroyed, but only this call reads them. Four bytes
+  /// after the last position must be readable (level files see to that), because Embree loads vertices 16 bytes at a
+  /// time. `filter`, if there is one, is asked about every hit, with `user`. Holds device.build_mutex(). Errors: Io
+  /// (out of memory, or what else Embree says).
   static Result<LevelScene> build(BvhDevice& device, const LevelView& level, EmbreeFilter filter = nullptr,
                                   void* user = nullptr);
 
@@ -40,7 +40,7 @@ class LevelScene {
   uint64_t build_peak_bytes_ = 0;
 };
 
-/// The cost of a level in a mapped file whose build pages were released (LevelFile::release_build_pages), with `scene`.
+/// The cost of a level in a LevelFile whose build pages were released (LevelFile::release_build_pages), with `scene`.
 LevelCost level_cost(const LevelView& level, const LevelScene& scene);
 
 /// Measures a level as the runtime would load it, by building its BVH once. Errors: those of LevelScene::build.

@@ -51,7 +51,7 @@ struct LevelEntry {
   uint64_t triangles = 0;
   uint64_t voxels = 0;
   uint64_t bricks = 0;
-  uint64_t resident_bytes = 0;    ///< mapped bytes that stay, plus BVH, once loaded
+  uint64_t resident_bytes = 0;    ///< bytes of the file that stay, plus BVH, once loaded
   uint64_t build_peak_bytes = 0;  ///< further bytes needed while the BVH is built
   double ray_cost = 0;            ///< work of a ray (bvh/ray_cost.h), >= 0; 0: not recorded
   std::optional<LevelErrors> errors;

@@ -115,7 +115,7 @@ class Verifier {
   /// The planner trusts this figure: at least the pages that rays read must be in it.
   void check_resident_bytes(const LevelEntry& entry, const LevelView& level) {
     const LevelFileSizes sizes = level_file_sizes(level);
-    const uint64_t least = sizes.mapped_bytes - sizes.build_only_bytes;
+    const uint64_t least = sizes.memory_bytes - sizes.build_only_bytes;
     if (entry.resident_bytes >= least) return;
     error(fmt::format("{}: the manifest counts {} resident bytes, but rays alone touch {}; bake the asset again", file_,
                       entry.resident_bytes, least));

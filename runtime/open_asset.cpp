@@ -69,7 +69,7 @@ Result<void> check_header(const LevelHeader& header, const OpenAsset& asset, uin
 Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::filesystem::path& path,
                               BvhDevice& device) {
   auto loaded = std::make_unique<LoadedLevel>();
-  FARFIELD_TRY_LET(loaded->file, LevelFile::open_known(path, asset.file_hashes[slot]));
+  FARFIELD_TRY_LET(loaded->file, LevelFile::open_known(path, asset.levels[slot].file_bytes, asset.file_hashes[slot]));
   const LevelView& view = loaded->file->view();
   FARFIELD_TRY(check_header(view.header, asset, slot, path));
   const SurfaceLook* look = view.header.level == 0 ? asset.close_up.get() : nullptr;

@@ -64,7 +64,7 @@ inline constexpr uint32_t kSceneBytesPerInstance = 120;
 inline constexpr uint32_t kSmallSceneBytesPerInstance = 64;
 
 struct RuntimeOptions {
-  uint64_t budget_bytes = uint64_t{1} << 32;  ///< hard: mapped, heap and Embree bytes together, build peaks included
+  uint64_t budget_bytes = uint64_t{1} << 32;  ///< hard: levels, heap and Embree's bytes together, build peaks included
   Blend blend = Blend::Dissolve;
   Residency residency = Residency::Wait;
   float pixel_error = 1.0f;            ///< pixels: how wide the voxels of a level may look; the budget aside. > 0
@@ -107,7 +107,7 @@ struct Stats {
   uint64_t levels_resident = 0;
   uint64_t levels_released = 0;
   uint64_t fallbacks = 0;  ///< visits of rays to instances that a coarser level served (progressive mode, broken files)
-  double load_seconds = 0;  ///< summed over loads: map, check, build
+  double load_seconds = 0;  ///< summed over loads: read, check, build
 };
 
 /// Thread rule: interaction(), stats() and all ray queries are safe from any thread at any time between two

@@ -526,6 +526,69 @@ TEST_F(RuntimeTest, ALevelThatWasReplacedSinceTheAssetWasOpenedIsNotMixedIn) {
   EXPECT_NE(host.messages[0].find("level_1.ffl"), std::string::npos) << host.messages[0];
 }
 
+/// What can happen to a file while a host has its asset open.
+void damage(const std::filesystem::path& file, uint32_t how) {
+  std::error_code ignored;
+  if (how % 3 == 0) std::filesystem::resize_file(file, 100, ignored);
+  if (how % 3 == 1) std::filesystem::remove(file, ignored);
+  if (how % 3 == 2) {
+    const std::string garbage(std::filesystem::file_size(file, ignored), '\xff');
+    std::fstream(file, std::ios::in | std::ios::out | std::ios::binary) << garbage;
+  }
+}
+
+TEST_F(RuntimeTest, WhatIsLoadedStaysAsItWasWhateverHappensToItsFiles) {
+  const auto asset = copy("changed.farfield");
+  Host host;
+  host.add(asset);
+  host.plan(vec3(0, 0, 25));
+  const uint64_t before = hash_of_hits(host, 0.02f);
+  uint32_t how = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(asset)) damage(entry.path(), how++);
+  EXPECT_EQ(hash_of_hits(host, 0.02f), before);
+  host.plan(vec3(0, 0, 25));
+  EXPECT_EQ(hash_of_hits(host, 0.02f), before);
+  EXPECT_TRUE(host.messages.empty()) << host.messages[0];
+}
+
+TEST_F(RuntimeTest, FilesThatAreDamagedWhileRaysFlyCostLevelsAndNothingElse) {
+  const auto distance_of = [](int frame) { return 3.0f * std::exp2f(static_cast<float>(frame * 5 % 8)); };
+  std::vector<uint64_t> sound_frames;
+  {
+    Host host;
+    host.add(sphere());
+    for (int frame = 0; frame < 8; ++frame) {
+      host.plan(vec3(0, 0, distance_of(frame)));
+      sound_frames.push_back(hash_of_hits(host, 0.005f));
+    }
+  }
+  size_t frames_as_they_should_be = 0, frames_with_messages = 0;
+  for (uint32_t trial = 0; trial < 12; ++trial) {
+    const auto asset = copy("damaged.farfield");
+    Host host;
+    host.add(asset);
+    std::thread vandal([&] {
+      for (const uint32_t level : {0u, 1u, 2u, 3u, 5u}) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(trial));
+        damage(asset / ("level_" + std::to_string(level) + ".ffl"), trial + level);
+      }
+    });
+    for (int frame = 0; frame < 8; ++frame) {
+      host.plan(vec3(0, 0, distance_of(frame)));
+      const uint64_t fallbacks = host.runtime().stats().fallbacks;
+      const bool is_as_it_should_be = hash_of_hits(host, 0.005f) == sound_frames[static_cast<size_t>(frame)];
+      const bool was_said = !host.messages.empty() && host.runtime().stats().fallbacks > fallbacks;
+      EXPECT_TRUE(is_as_it_should_be || was_said) << "trial " << trial << ", frame " << frame;
+      frames_as_they_should_be += is_as_it_should_be;
+      frames_with_messages += was_said;
+    }
+    vandal.join();
+    EXPECT_LE(host.messages.size(), 5u);
+  }
+  EXPECT_GT(frames_as_they_should_be, 0u);
+  EXPECT_GT(frames_with_messages, 0u);
+}
+
 TEST_F(RuntimeTest, ProgressiveRaysUseTheRootFirstAndThePlanInTheEnd) {
   RuntimeOptions options;
   options.residency = Residency::Progressive;
