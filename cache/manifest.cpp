@@ -9,6 +9,7 @@
 
 #include "base/file_io.h"
 #include "base/hash.h"
+#include "base/json_words.h"
 #include "cache/json_reader.h"
 #include "cache/material_json.h"
 
@@ -290,7 +291,7 @@ Result<Manifest> manifest_from_json(std::string_view text, std::string_view name
   try {
     json = Json::parse(text);
   } catch (const Json::exception& error) {  // the only way to learn where the syntax is wrong
-    return broken(printable(error.what()));
+    return broken(printable(json_words(error.what())));
   }
 
   FieldReader read;

@@ -288,8 +288,8 @@ TEST(HostileManifest, VersionsAreCheckedFirst) {
 
 TEST(HostileManifest, NumbersThatDoNotFitAreRefused) {
   expect_message(with("/base_resolution", "1e999"), "number overflow");
-  expect_message(with("/base_resolution", "NaN"), "parse error");
-  expect_message(with("/base_resolution", "-Infinity"), "parse error");
+  expect_message(with("/base_resolution", "NaN"), "its JSON is wrong");
+  expect_message(with("/base_resolution", "-Infinity"), "its JSON is wrong");
   expect_message(with("/origin", "[1, 2, 1e400]"), "number overflow");
   expect_message(with("/bounds_upper", "[1, 2, 1e39]"), "not finite");  // fits a double, not a float
   expect_message(with("/hull/0", "[0, 0, -1e300]"), "not finite");
