@@ -238,6 +238,66 @@ TEST_F(Shot, DamagedFrameIsRenderedAgain) {
   }
 }
 
+TEST_F(Shot, ALostPreviewIsMadeAgainAndTheFrameIsKept) {
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  const std::vector<std::byte> preview = test::read_bytes(out() / "frame_0012.png");
+  const auto time = time_of("frame_0012.exr");
+  std::filesystem::remove(out() / "frame_0012.png");
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  EXPECT_EQ(test::read_bytes(out() / "frame_0012.png"), preview);
+  EXPECT_EQ(time_of("frame_0012.exr"), time);
+}
+
+TEST_F(Shot, AnotherFrameUnderAFramesNameIsNoticed) {
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  const std::vector<std::byte> bytes = test::read_bytes(out() / "frame_0012.exr");
+  std::filesystem::copy_file(out() / "frame_0000.exr", out() / "frame_0012.exr",
+                             std::filesystem::copy_options::overwrite_existing);
+  std::vector<std::string> warnings;
+  options_.warning = [&](const std::string& line) { warnings.push_back(line); };
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  EXPECT_EQ(test::read_bytes(out() / "frame_0012.exr"), bytes);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("frame_0012.exr: it is not what this shot has written; it is rendered again"),
+            std::string::npos)
+      << warnings[0];
+}
+
+TEST_F(Shot, LevelsThatAreLostMeanwhileAreSaidMarkedAndRenderedAgain) {
+  options_.width = 480, options_.height = 320, options_.trace.samples_per_pixel = 1;
+  ASSERT_TRUE(shoot({0, 2, 2}));  // bakes
+  const std::vector<std::byte> sound = test::read_bytes(out() / "frame_0002.exr");
+  std::filesystem::remove_all(out());
+
+  const auto level = [&](int k) {
+    return options_.assets / "scene" / "ball.farfield" / fmt::format("level_{}.ffl", k);
+  };
+  std::vector<std::string> warnings;
+  options_.warning = [&](const std::string& line) { warnings.push_back(line); };
+  options_.job.progress = [&](double, const std::string& what) {  // while the frame before is rendered
+    if (what.find("frame 0") != 0) return;
+    for (const int k : {1, 2, 3}) std::filesystem::resize_file(level(k), 100);
+  };
+  const auto report = shoot({0, 2, 2});
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().code, ErrorCode::BadFile);
+  EXPECT_NE(report.error().message.find("1 of 2 frames show coarser levels than planned (frame 2)"), std::string::npos)
+      << report.error().message;
+  ASSERT_FALSE(warnings.empty());
+  EXPECT_NE(warnings[0].find("is left out, a coarser one serves"), std::string::npos) << warnings[0];
+  EXPECT_EQ(record()["frames"][0]["degraded"], false);
+  EXPECT_EQ(record()["frames"][1]["degraded"], true);
+  EXPECT_NE(test::read_bytes(out() / "frame_0002.exr"), sound);
+
+  options_.job = {};
+  const auto first_time = time_of("frame_0000.exr");
+  const auto mended = shoot({0, 2, 2});  // the bake mends the asset first
+  ASSERT_TRUE(mended) << mended.error().message;
+  EXPECT_EQ(time_of("frame_0000.exr"), first_time);
+  EXPECT_EQ(record()["frames"][1]["degraded"], false);
+  EXPECT_EQ(test::read_bytes(out() / "frame_0002.exr"), sound);
+}
+
 TEST_F(Shot, FrameDoesNotDependOnTheFramesBefore) {
   ASSERT_TRUE(shoot({0, 24, 6}));
   ASSERT_TRUE(render_frame(options_, 24, folder_.path() / "alone.exr"));
