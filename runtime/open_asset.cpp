@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "base/result.h"
+#include "cache/hull_check.h"
 #include "cache/level_file.h"
 #include "cache/manifest.h"
 
@@ -42,9 +43,10 @@ Result<void> check_planned_bytes(const LevelEntry& entry, const std::filesystem:
                                 (folder / kManifestName).string(), entry.level, entry.file_bytes));
 }
 
-/// A level's file must be the one that the manifest means, since plans and rays go by the manifest.
-Result<void> check_header(const LevelHeader& header, const OpenAsset& asset, uint32_t slot,
-                          const std::filesystem::path& path) {
+/// A level's file must be what the manifest says, since plans and rays go by the manifest.
+Result<void> check_level(const LevelView& level, const OpenAsset& asset, uint32_t slot,
+                         const std::filesystem::path& path) {
+  const LevelHeader& header = level.header;
   const LevelInfo& info = asset.levels[slot];
   const auto refuse = [&](const std::string& what) {
     return make_error(ErrorCode::BadFile,
@@ -56,12 +58,15 @@ Result<void> check_header(const LevelHeader& header, const OpenAsset& asset, uin
   if (!(std::abs(header.resolution - info.resolution) <= 1e-5f * info.resolution)) {
     return refuse(fmt::format("its resolution is {}, the manifest says {}", header.resolution, info.resolution));
   }
-  const Box3 allowed = padded_bounds(asset.traced.bounds);
   if (header.bounds.is_empty()) return {};
+  const Box3 allowed = padded_bounds(asset.traced.bounds);
   for (int axis = 0; axis < 3; ++axis) {
     if (!(header.bounds.lower[axis] >= allowed.lower[axis] && header.bounds.upper[axis] <= allowed.upper[axis])) {
       return refuse("it sticks out of the bounds that the manifest gives");
     }
+  }
+  if (reach_out_of_hull(level, asset.traced.hull) > hull_slack(asset.traced.bounds)) {
+    return refuse("it sticks out of the hull that the manifest gives");
   }
   return {};
 }
@@ -71,7 +76,7 @@ Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::
   auto loaded = std::make_unique<LoadedLevel>();
   FARFIELD_TRY_LET(loaded->file, LevelFile::open_known(path, asset.levels[slot].file_bytes, asset.file_hashes[slot]));
   const LevelView& view = loaded->file->view();
-  FARFIELD_TRY(check_header(view.header, asset, slot, path));
+  FARFIELD_TRY(check_level(view, asset, slot, path));
   const SurfaceLook* look = view.header.level == 0 ? asset.close_up.get() : nullptr;
   FARFIELD_TRY_LET(auto traced, TracedLevel::build(device, view, slot, look));
   loaded->traced = std::move(traced);

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "base/random.h"
 #include "tests/support/asset_writer.h"
@@ -166,6 +167,42 @@ TEST(Manifest, FieldsThatThisVersionDoesNotKnowAreIgnored) {
   json["note"] = {{"by", "someone"}};
   json["levels"][0]["note"] = 1;
   EXPECT_TRUE(manifest_from_json(json.dump(), "test"));
+}
+
+// ---- the checksum ----
+
+TEST(Manifest, WhatIsWrittenHasAChecksumAndOlderTextsHaveNone) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_manifest(folder.path(), sample_manifest()));
+  EXPECT_TRUE(read_manifest(folder.path())->has_checksum);
+  EXPECT_FALSE(read_manifest(FARFIELD_TEST_DATA "/format_v1")->has_checksum);
+  ASSERT_TRUE(write_manifest(folder.path(), *read_manifest(folder.path())));  // as `farfield evaluate` does
+  EXPECT_TRUE(read_manifest(folder.path())->has_checksum);
+}
+
+TEST(HostileManifest, NoChangedByteOfAFileChangesWhatIsRead) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_manifest(folder.path(), sample_manifest()));
+  const auto bytes = test::read_bytes(folder.path() / "manifest.json");
+  const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const std::string sound = manifest_to_json(*manifest_from_json(text, "test"));
+  size_t refused = 0, tried = 0;
+  for (size_t i = 0; i < text.size(); ++i) {
+    for (const char other : {'0', '7', ' ', static_cast<char>(text[i] ^ 1)}) {
+      std::string changed = text;
+      if (std::exchange(changed[i], other) == other) continue;
+      ++tried;
+      const Result<Manifest> read = manifest_from_json(changed, "test");
+      refused += !read;
+      if (read) {
+        EXPECT_EQ(manifest_to_json(*read), sound) << i;
+      }
+    }
+  }
+  EXPECT_EQ(refused, tried - 4 * 8);  // all but those that make "checksum" another word
+  std::string moved = text;
+  moved.replace(moved.find("10000000.0"), 10, "10000001.0");
+  EXPECT_NE(manifest_from_json(moved, "test").error().message.find("its checksum is wrong"), std::string::npos);
 }
 
 // ---- what is wrong with a manifest that is well-formed ----

@@ -192,6 +192,24 @@ TEST_F(RuntimeTest, AManifestThatPromisesLessThanItsFilesIsRefused) {
   EXPECT_NE(asset.error().message.find("level 1"), std::string::npos) << asset.error().message;
 }
 
+TEST_F(RuntimeTest, AHullThatWouldCutALevelIsRefused) {
+  const auto cut = copy("cut_hull.farfield");
+  Manifest manifest = *read_manifest(cut);
+  for (int i = 0; i < 8; ++i) manifest.hull.push_back(manifest.bounds.corner(i));
+  ASSERT_TRUE(write_manifest(cut, manifest));
+  {
+    Host host;
+    EXPECT_TRUE(host.runtime().open_asset(cut.string()));
+  }
+  for (vec3& point : manifest.hull) point.x *= 0.9f;
+  ASSERT_TRUE(write_manifest(cut, manifest));
+  Host host;
+  const auto asset = host.runtime().open_asset(cut.string());
+  ASSERT_FALSE(asset);
+  EXPECT_EQ(asset.error().code, ErrorCode::BadFile);
+  EXPECT_NE(asset.error().message.find("sticks out of the hull"), std::string::npos) << asset.error().message;
+}
+
 TEST_F(RuntimeTest, AssetsCanBeOpenedWhileTheLoaderWorks) {
   RuntimeOptions options;
   options.residency = Residency::Progressive;
