@@ -3,6 +3,7 @@
 
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <thread>
 #include <utility>
 
@@ -11,10 +12,25 @@ namespace farfield {
 bool BvhDevice::on_memory(void* self, ssize_t bytes, bool /*post*/) {
   auto& device = *static_cast<BvhDevice*>(self);
   const int64_t now = device.bytes_.fetch_add(bytes, std::memory_order_relaxed) + bytes;
+  if (bytes > 0 && now > device.limit_bytes_.load(std::memory_order_relaxed)) {
+    device.bytes_.fetch_sub(bytes, std::memory_order_relaxed);  // Embree does not take it, and does not give it back
+    device.is_limit_exceeded_.store(true, std::memory_order_relaxed);
+    return false;
+  }
   int64_t peak = device.peak_bytes_.load(std::memory_order_relaxed);
   while (now > peak && !device.peak_bytes_.compare_exchange_weak(peak, now, std::memory_order_relaxed)) {
   }
-  return true;  // a veto would leave Embree's own sum wrong for ever; budgets are checked before a build starts
+  return true;
+}
+
+void BvhDevice::set_limit(uint64_t bytes) {
+  is_limit_exceeded_.store(false, std::memory_order_relaxed);
+  limit_bytes_.store(static_cast<int64_t>(std::min<uint64_t>(bytes, kNoLimit)), std::memory_order_relaxed);
+}
+
+bool BvhDevice::end_limit() {
+  limit_bytes_.store(kNoLimit, std::memory_order_relaxed);
+  return is_limit_exceeded_.load(std::memory_order_relaxed);
 }
 
 Result<std::unique_ptr<BvhDevice>> BvhDevice::create() {

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <mutex>
 
@@ -31,14 +32,23 @@ class BvhDevice {
   uint64_t peak_bytes() const { return static_cast<uint64_t>(peak_bytes_.load(std::memory_order_relaxed)); }
   void reset_peak() { peak_bytes_.store(bytes_.load(std::memory_order_relaxed), std::memory_order_relaxed); }
 
+  /// Embree gets no memory that would take bytes() above this: the build in progress then fails. For builds, under
+  /// build_mutex().
+  void set_limit(uint64_t bytes);
+  /// Takes the limit away. True: Embree has asked for more than it allowed.
+  bool end_limit();
+
  private:
   BvhDevice() = default;
+  static constexpr int64_t kNoLimit = std::numeric_limits<int64_t>::max();
   static bool on_memory(void* self, ssize_t bytes, bool post);
 
   std::mutex build_mutex_;
   // relaxed: only counters; whoever compares them holds build_mutex_ and has joined the build's threads.
   std::atomic<int64_t> bytes_{0};
   std::atomic<int64_t> peak_bytes_{0};
+  std::atomic<int64_t> limit_bytes_{kNoLimit};
+  std::atomic<bool> is_limit_exceeded_{false};
   EmbreeDevice device_;  // last, so released first: what it gives back is still counted
 };
 

@@ -8,12 +8,14 @@
 #include <algorithm>
 #include <vector>
 
+#include "base/bytes.h"
 #include "base/result.h"
 #include "cache/level_file.h"
 
 namespace farfield {
 
-Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, EmbreeFilter filter, void* user) {
+Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, uint64_t most_bytes,
+                                     EmbreeFilter filter, void* user) {
   LevelScene result;
   if (!level.has_surface()) return result;
 
@@ -26,11 +28,19 @@ Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, 
   share_array(quads.get(), level.positions);
   share_array(quads.get(), level.quads);
   if (filter) set_filter(quads.get(), filter, user);
+  constexpr uint64_t kOverheadBytes = kSceneOverheadBytes + kGeometryOverheadBytes;
+  const uint64_t most_of_embree = most_bytes - std::min(most_bytes, kOverheadBytes);
+  device.set_limit(bytes_before + std::min(most_of_embree, kAnyBytes - bytes_before));
   result.scene_ = build_static_scene(device.handle(), quads.get());
+  if (device.end_limit()) {
+    forget_embree_error(device.handle());
+    return make_error(ErrorCode::OutOfBudget, fmt::format("the BVH of {} quads takes more than {}", level.quads.size(),
+                                                          format_bytes(most_bytes)));
+  }
   FARFIELD_TRY(check_embree(device.handle(), fmt::format("build a BVH of {} quads", level.quads.size())));
 
   const uint64_t bytes_after = device.bytes();
-  result.bytes_ = bytes_after - std::min(bytes_before, bytes_after) + kSceneOverheadBytes + kGeometryOverheadBytes;
+  result.bytes_ = bytes_after - std::min(bytes_before, bytes_after) + kOverheadBytes;
   result.build_peak_bytes_ = device.peak_bytes() - bytes_after;
   return result;
 }

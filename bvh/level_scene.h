@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include "base/embree.h"
 #include "base/result.h"
@@ -15,6 +16,9 @@ namespace farfield {
 inline constexpr uint64_t kSceneOverheadBytes = 3072;
 inline constexpr uint64_t kGeometryOverheadBytes = 300;
 
+/// As much memory as there is.
+inline constexpr uint64_t kAnyBytes = std::numeric_limits<uint64_t>::max();
+
 /// A committed Embree scene of one quad geometry with geomID 0 and primID = index of the quad; nothing for a level
 /// without a surface. Movable; any thread may trace it.
 class LevelScene {
@@ -23,10 +27,11 @@ class LevelScene {
   /// Builds on the calling thread alone, so that the same level always takes the same bytes. The level's arrays are
   /// shared, not copied: they stay where they are until this is destroyed, but only this call reads them. Four bytes
   /// after the last position must be readable (level files see to that), because Embree loads vertices 16 bytes at a
-  /// time. `filter`, if there is one, is asked about every hit, with `user`. Holds device.build_mutex(). Errors: Io
-  /// (out of memory, or what else Embree says).
-  static Result<LevelScene> build(BvhDevice& device, const LevelView& level, EmbreeFilter filter = nullptr,
-                                  void* user = nullptr);
+  /// time. Embree gets no more than `most_bytes`, at the worst moment. `filter`, if there is one, is asked about every
+  /// hit, with `user`. Holds device.build_mutex(). Errors: OutOfBudget (most_bytes are not enough), Io (out of memory,
+  /// or what else Embree says).
+  static Result<LevelScene> build(BvhDevice& device, const LevelView& level, uint64_t most_bytes = kAnyBytes,
+                                  EmbreeFilter filter = nullptr, void* user = nullptr);
 
   EmbreeSceneRef handle() const { return scene_.get(); }  ///< null without a surface
   /// Bytes that the BVH holds, overheads included.

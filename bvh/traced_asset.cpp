@@ -55,7 +55,7 @@ void opacity_filter(const EmbreeFilterArguments* args) {
 }  // namespace
 
 Result<std::unique_ptr<TracedLevel>> TracedLevel::build(BvhDevice& device, const LevelView& level, uint32_t slot,
-                                                        const SurfaceLook* look) {
+                                                        const SurfaceLook* look, uint64_t most_bytes) {
   std::unique_ptr<TracedLevel> traced(new TracedLevel);
   traced->view = level;
   traced->volume = BrickVolume(level);
@@ -64,7 +64,8 @@ Result<std::unique_ptr<TracedLevel>> TracedLevel::build(BvhDevice& device, const
   traced->voxel_count = farfield::voxel_count(level);
   traced->look = look;
   const bool is_opaque = level.face_opacity.empty() && level.face_gap.empty();
-  FARFIELD_TRY_LET(traced->scene, LevelScene::build(device, level, is_opaque ? nullptr : opacity_filter, traced.get()));
+  FARFIELD_TRY_LET(traced->scene,
+                   LevelScene::build(device, level, most_bytes, is_opaque ? nullptr : opacity_filter, traced.get()));
   return traced;
 }
 

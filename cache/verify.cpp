@@ -28,7 +28,7 @@ struct FinerLevel {
 
 class Verifier {
  public:
-  explicit Verifier(const fs::path& folder) : folder_(folder) {}
+  Verifier(const fs::path& folder, const MeasureCost& measure) : folder_(folder), measure_(measure) {}
 
   VerifyResult run() {
     const Result<Manifest> manifest = read_manifest(folder_);
@@ -90,6 +90,7 @@ class Verifier {
     expect_count("the level's number", entry.level, level.header.level);
     check_resolution(entry, level);
     check_resident_bytes(entry, level);
+    if (measure_) check_cost(entry, level);
     check_bounds(level);
     check_hull(level);
     check_morph(level, finer, is_first);
@@ -126,6 +127,20 @@ class Verifier {
     if (entry.resident_bytes >= least) return;
     error(fmt::format("{}: the manifest counts {} resident bytes, but rays alone touch {}; bake the asset again", file_,
                       entry.resident_bytes, least));
+  }
+
+  void check_cost(const LevelEntry& entry, const LevelView& level) {
+    const Result<LevelCost> cost = measure_(level);
+    if (!cost) return error(fmt::format("{}: it cannot be loaded: {}", file_, cost.error().message));
+    const uint64_t measured = cost->resident_bytes + cost->build_peak_bytes;
+    const uint64_t promised = entry.resident_bytes + entry.build_peak_bytes;
+    if (measured == promised && cost->resident_bytes == entry.resident_bytes) return;
+    const bool is_lie = promised / 2 < measured / 3;
+    add(is_lie ? Finding::Severity::Error : Finding::Severity::Warning,
+        fmt::format(
+            "{}: it takes {} bytes, and {} more while it is loaded; the manifest says {} and {}; bake the asset "
+            "again on this kind of processor",
+            file_, cost->resident_bytes, cost->build_peak_bytes, entry.resident_bytes, entry.build_peak_bytes));
   }
 
   void check_bounds(const LevelView& level) {
@@ -176,6 +191,7 @@ class Verifier {
   }
 
   const fs::path& folder_;
+  const MeasureCost& measure_;
   const Manifest* manifest_ = nullptr;
   std::string file_;  ///< what is being checked
   VerifyResult result_;
@@ -187,6 +203,8 @@ bool VerifyResult::is_sound() const {
   return std::ranges::none_of(findings, [](const Finding& f) { return f.severity == Finding::Severity::Error; });
 }
 
-VerifyResult verify_asset(const fs::path& asset_dir) { return Verifier(asset_dir).run(); }
+VerifyResult verify_asset(const fs::path& asset_dir, const MeasureCost& measure) {
+  return Verifier(asset_dir, measure).run();
+}
 
 }  // namespace farfield

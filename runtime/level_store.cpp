@@ -67,8 +67,8 @@ Result<uint32_t> LevelStore::open(const std::filesystem::path& folder, MaterialF
 Result<void> LevelStore::load_root(OpenAsset& asset) {
   for (uint32_t slot = 0; slot < asset.traced.slot_count(); ++slot) {
     ResidencyItem item = make_level_item(asset, slot, *device_);
-    item.load = [this, load = std::move(item.load)] {
-      Result<LoadedItem> loaded = load();
+    item.load = [this, load = std::move(item.load)](uint64_t bytes_left) {
+      Result<LoadedItem> loaded = load(bytes_left);
       if (loaded) count_freed(loaded->build_peak_bytes);
       return loaded;
     };

@@ -3,9 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <system_error>
 
+#include "base/bytes.h"
 #include "base/result.h"
 #include "cache/hull_check.h"
 #include "cache/level_file.h"
@@ -72,14 +74,22 @@ Result<void> check_level(const LevelView& level, const OpenAsset& asset, uint32_
 }
 
 Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::filesystem::path& path,
-                              BvhDevice& device) {
+                              BvhDevice& device, uint64_t bytes_left) {
   auto loaded = std::make_unique<LoadedLevel>();
   FARFIELD_TRY_LET(loaded->file, LevelFile::open_known(path, asset.levels[slot].file_bytes, asset.file_hashes[slot]));
   const LevelView& view = loaded->file->view();
   FARFIELD_TRY(check_level(view, asset, slot, path));
   const SurfaceLook* look = view.header.level == 0 ? asset.close_up.get() : nullptr;
-  FARFIELD_TRY_LET(auto traced, TracedLevel::build(device, view, slot, look));
-  loaded->traced = std::move(traced);
+  const uint64_t file_bytes = level_file_sizes(view).memory_bytes;  // at most bytes_left, by check_planned_bytes()
+  auto traced = TracedLevel::build(device, view, slot, look, bytes_left - std::min(bytes_left, file_bytes));
+  if (!traced) {
+    return make_error(
+        traced.error().code,
+        fmt::format("{}: {}; its manifest says {} with all else: raise the budget, or see `farfield verify`",
+                    path.string(), traced.error().message,
+                    format_bytes(asset.levels[slot].resident_bytes + asset.build_peak_bytes[slot])));
+  }
+  loaded->traced = std::move(*traced);
   loaded->file->release_build_pages();
   const LevelCost cost = level_cost(view, loaded->traced->scene);
   return LoadedItem{std::move(loaded), cost.resident_bytes, cost.build_peak_bytes};
@@ -129,7 +139,9 @@ Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folde
 
 ResidencyItem make_level_item(const OpenAsset& asset, uint32_t slot, BvhDevice& device) {
   return {asset.levels[slot].resident_bytes, asset.build_peak_bytes[slot],
-          [&asset, slot, &device] { return load_level(asset, slot, asset.folder / asset.file_names[slot], device); }};
+          [&asset, slot, &device](uint64_t bytes_left) {
+            return load_level(asset, slot, asset.folder / asset.file_names[slot], device, bytes_left);
+          }};
 }
 
 }  // namespace farfield

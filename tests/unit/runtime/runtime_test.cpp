@@ -192,6 +192,26 @@ TEST_F(RuntimeTest, AManifestThatPromisesLessThanItsFilesIsRefused) {
   EXPECT_NE(asset.error().message.find("level 1"), std::string::npos) << asset.error().message;
 }
 
+TEST_F(RuntimeTest, ALoadNeverTakesMoreThanTheBudgetHoweverTheManifestLies) {
+  const auto liar = copy("small_liar.farfield");
+  Manifest manifest = *read_manifest(liar);
+  LevelEntry& finest = manifest.levels[0];
+  const uint64_t truth = finest.resident_bytes + finest.build_peak_bytes;
+  finest.resident_bytes = finest.file_bytes, finest.build_peak_bytes = 0;
+  ASSERT_TRUE(write_manifest(liar, manifest));
+  ASSERT_GT(truth, finest.file_bytes * 3 / 2);
+  const uint64_t budget = finest.file_bytes + (truth - finest.file_bytes) / 2;
+  Host host(with_budget(budget));
+  host.add(liar);
+  EXPECT_EQ(host.plan(vec3(0, 0, 2)).finest_level[0], 0u) << "the plan believes the manifest";
+  hash_of_hits(host);
+  EXPECT_LE(host.runtime().stats().peak_accounted_bytes, budget);
+  ASSERT_EQ(host.messages.size(), 1u);
+  EXPECT_NE(host.messages[0].find("level_0.ffl: the BVH of"), std::string::npos) << host.messages[0];
+  EXPECT_NE(host.messages[0].find("farfield verify"), std::string::npos) << host.messages[0];
+  EXPECT_GT(host.runtime().stats().fallbacks, 0u);
+}
+
 TEST_F(RuntimeTest, AHullThatWouldCutALevelIsRefused) {
   const auto cut = copy("cut_hull.farfield");
   Manifest manifest = *read_manifest(cut);
@@ -201,7 +221,7 @@ TEST_F(RuntimeTest, AHullThatWouldCutALevelIsRefused) {
     Host host;
     EXPECT_TRUE(host.runtime().open_asset(cut.string()));
   }
-  for (vec3& point : manifest.hull) point.x *= 0.9f;
+  for (vec3& point : manifest.hull) point.x *= 0.5f;
   ASSERT_TRUE(write_manifest(cut, manifest));
   Host host;
   const auto asset = host.runtime().open_asset(cut.string());
