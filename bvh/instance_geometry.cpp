@@ -231,7 +231,8 @@ bool InstanceGeometry::occluded(uint32_t instance, EmbreeRay& ray, const RayCont
 void InstanceGeometry::bounds_callback(const RTCBoundsFunctionArguments* args) {
   const auto& self = *static_cast<const InstanceGeometry*>(args->geometryUserPtr);
   const InstanceRecord& instance = self.instances[args->primID];
-  const Box3 bounds = instance_bounds(instance, *self.assets[instance.asset]);
+  // The empty box of a hidden instance is not valid: Embree leaves it out.
+  const Box3 bounds = self.is_hidden(args->primID) ? Box3() : instance_bounds(instance, *self.assets[instance.asset]);
   args->bounds_o->lower_x = bounds.lower.x, args->bounds_o->upper_x = bounds.upper.x;
   args->bounds_o->lower_y = bounds.lower.y, args->bounds_o->upper_y = bounds.upper.y;
   args->bounds_o->lower_z = bounds.lower.z, args->bounds_o->upper_z = bounds.upper.z;
@@ -273,6 +274,12 @@ void InstanceGeometry::occluded_callback(const RTCOccludedFunctionNArguments* ar
     EmbreeRay ray = rtcGetRayFromRayN(args->ray, args->N, lane);
     if (self.occluded(args->primID, ray, context, args->context)) RTCRayN_tfar(args->ray, args->N, lane) = -kInfinity;
   }
+}
+
+void InstanceGeometry::set_hidden(uint32_t instance, bool is_hidden) {
+  if (!is_hidden && instance >= hidden.size()) return;
+  if (instance >= hidden.size()) hidden.resize(instances.size());
+  hidden[instance] = is_hidden;
 }
 
 EmbreeGeometry InstanceGeometry::create(EmbreeDeviceRef device) {

@@ -55,9 +55,13 @@ class InstanceGeometry {
   std::vector<InstanceRecord> instances;
   std::vector<const TracedAsset*> assets;  ///< InstanceRecord::asset indexes it
   std::optional<float> forced_lambda;
+  std::vector<bool> hidden;  ///< per instance, up to the last that no ray meets
 
-  /// A new user geometry over all instances, committed. Refers to this object. Call update() after
-  /// instances were added or moved.
+  bool is_hidden(uint32_t instance) const { return instance < hidden.size() && hidden[instance]; }
+  void set_hidden(uint32_t instance, bool is_hidden);
+
+  /// A new user geometry over all instances, committed. Refers to this object. Call update() after instances were
+  /// added, moved, hidden or shown.
   EmbreeGeometry create(EmbreeDeviceRef device);
   /// Tells Embree about the instances as they are now; the scene needs a commit too.
   void update(EmbreeGeometryRef geometry);

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <malloc.h>
 
+#include <algorithm>
 #include <utility>
 
 namespace farfield {
@@ -59,6 +60,7 @@ Result<uint32_t> LevelStore::open(const std::filesystem::path& folder, MaterialF
     return tl::unexpected(root.error());
   }
   asset->traced.usable_slots = {static_cast<uint8_t>(asset->traced.slot_count() - 1)};  // until a plan says otherwise
+  table_bytes_ += asset->table_bytes();
   assets_.push_back(std::move(asset));
   levels_.set_other_bytes(fixed_bytes() + texture_bytes_);
   return static_cast<uint32_t>(assets_.size() - 1);
@@ -78,7 +80,7 @@ Result<void> LevelStore::load_root(OpenAsset& asset) {
   loader_.resize(levels_.size());
 
   // Roots come first: what an earlier plan has loaded beside them may be in the way, and the next plan decides anew.
-  FARFIELD_TRY_LET(const auto plan, plan_roots(asset));
+  FARFIELD_TRY_LET(const auto plan, plan_roots(&asset));
   const size_t root = asset.items.back();
   const uint64_t needed = levels_.resident_bytes(root) + levels_.build_peak_bytes(root) + asset.table_bytes();
   if (levels_.stats().accounted_bytes + needed > budget_bytes_) apply(plan, 0);
@@ -91,14 +93,39 @@ Result<void> LevelStore::load_root(OpenAsset& asset) {
   return {};
 }
 
-/// The plan in which all assets have nothing but their roots.
-Result<Plan> LevelStore::plan_roots(const OpenAsset& newcomer) const {
+/// The plan in which all assets, and the one that is being opened, have nothing but their roots.
+Result<Plan> LevelStore::plan_roots(const OpenAsset* newcomer) const {
   std::vector<PlanAsset> wanted;
   for (const auto& asset : assets_) wanted.push_back(plan_asset(*asset));
-  wanted.push_back(plan_asset(newcomer));
-  auto plan = plan_levels(wanted, budget_bytes_, fixed_bytes() + newcomer.table_bytes());
-  if (plan) plan->usable.pop_back();  // apply() knows the newcomer not yet
+  if (newcomer) wanted.push_back(plan_asset(*newcomer));
+  auto plan = plan_levels(wanted, budget_bytes_, fixed_bytes() + (newcomer ? newcomer->table_bytes() : 0));
+  if (plan && newcomer) plan->usable.pop_back();  // apply() knows it not yet
   return plan;
+}
+
+Result<void> LevelStore::set_instance_bytes(uint64_t bytes) {
+  if (levels_.stats().accounted_bytes - instance_bytes_ + bytes > budget_bytes_) {
+    const uint64_t former = std::exchange(instance_bytes_, bytes);
+    const Result<Plan> roots = plan_roots(nullptr);
+    instance_bytes_ = former;
+    if (!roots) return tl::unexpected(roots.error());
+    apply(*roots, 0);
+  }
+  instance_bytes_ = bytes;
+  levels_.set_other_bytes(fixed_bytes() + texture_bytes_);
+  return {};
+}
+
+Result<uint64_t> LevelStore::least_bytes(std::span<const std::filesystem::path> folders, uint64_t instance_bytes) {
+  Messages silent({});
+  TextureCache textures(silent);
+  uint64_t bytes = kRuntimeBytes + instance_bytes, largest_peak = 0;
+  for (const std::filesystem::path& folder : folders) {
+    FARFIELD_TRY_LET(const auto asset, read_asset(folder, {}, textures));
+    bytes += asset->table_bytes() + asset->levels.back().resident_bytes;
+    largest_peak = std::max(largest_peak, asset->build_peak_bytes.back());
+  }
+  return bytes + largest_peak;
 }
 
 PlanAsset LevelStore::plan_asset(const OpenAsset& asset) const {
@@ -159,11 +186,7 @@ void LevelStore::load(uint32_t asset, uint32_t slot) {
   }
 }
 
-uint64_t LevelStore::fixed_bytes() const {
-  uint64_t bytes = kRuntimeBytes + instance_bytes_;
-  for (const auto& asset : assets_) bytes += asset->table_bytes();
-  return bytes;
-}
+uint64_t LevelStore::fixed_bytes() const { return kRuntimeBytes + instance_bytes_ + table_bytes_; }
 
 /// Builds and releases leave holes in the heap, which `ps` still counts.
 void LevelStore::count_freed(uint64_t bytes) {

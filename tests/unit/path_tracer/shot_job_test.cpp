@@ -71,8 +71,9 @@ class Shot : public ::testing::Test {
     options_.message = [this](const std::string& line) { messages_ += line + "\n"; };
   }
 
-  /// parent: JSON members of a node that all others become children of; empty: none.
-  void write_scene(const std::string& parent) const {
+  /// parent: JSON members of a node that all others become children of; empty: none. The animation moves node 2, the
+  /// camera, or node 0, a ball, along z from 4 to 200.
+  void write_scene(const std::string& parent, int animated_node = 2) const {
     std::string text = R"({"asset": {"version": "2.0"},
 "buffers": [{"uri": "scene.bin", "byteLength": 68}],
 "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 8},
@@ -85,12 +86,13 @@ class Shot : public ::testing::Test {
 "nodes": [{"mesh": 0}, {"mesh": 0, "translation": [-3, 0, -2]}, {"camera": 0, "name": "camera"},
           {PARENT}],
 "animations": [{"samplers": [{"input": 1, "output": 2}],
-                "channels": [{"sampler": 0, "target": {"node": 2, "path": "translation"}}]}],
+                "channels": [{"sampler": 0, "target": {"node": ANIMATED, "path": "translation"}}]}],
 "scenes": [{"nodes": [ROOTS]}], "scene": 0})";
     const auto fill = [&](const std::string& marker, const std::string& what) {
       text.replace(text.find(marker), marker.size(), what);
     };
     fill("PARENT", parent.empty() ? "" : R"("children": [0, 1, 2], )" + parent);
+    fill("ANIMATED", fmt::format("{}", animated_node));
     fill("ROOTS", parent.empty() ? "0, 1, 2" : "3");
     test::write_text(folder_.path() / "scene.gltf", text);
   }
@@ -394,6 +396,25 @@ TEST_F(Shot, BudgetBelowTheRootsNamesWhatIsNeeded) {
   const auto report = shoot({0, 0, 1});
   ASSERT_FALSE(report);
   EXPECT_EQ(report.error().code, ErrorCode::OutOfBudget);
+  const std::string& message = report.error().message;
+  const size_t bracket = message.rfind('(');
+  ASSERT_NE(bracket, std::string::npos) << message;
+  options_.budget_bytes = std::stoull(message.substr(bracket + 1));
+  EXPECT_TRUE(shoot({0, 0, 1}));
+  --options_.budget_bytes;
+  EXPECT_FALSE(shoot({0, 0, 1}));
+}
+
+TEST_F(Shot, MovingInstancesMakeTheSameFramesAsScenesOpenedForEach) {
+  write_scene("", 0);
+  const auto frame_alone = [&](int frame) {
+    EXPECT_TRUE(render_frame(options_, frame, folder_.path() / "alone.exr"));
+    return test::read_bytes(folder_.path() / "alone.exr");
+  };
+  ASSERT_TRUE(shoot({0, 2, 1}));
+  EXPECT_NE(test::read_bytes(out() / "frame_0001.exr"), test::read_bytes(out() / "frame_0000.exr"));
+  for (const int frame : {0, 1, 2})
+    EXPECT_EQ(frame_alone(frame), test::read_bytes(out() / fmt::format("frame_{:04}.exr", frame)));
 }
 
 TEST_F(Shot, FullDetailShowsLevelZeroOnly) {

@@ -495,17 +495,128 @@ TEST_F(RuntimeTest, ALevelThatDidNotFitIsLoadedOnceAPlanHasRoom) {
   EXPECT_EQ(level_seen_at(far), 0u);
 }
 
-TEST_F(RuntimeTest, AFailedPlanLeavesTheFormerOne) {
-  Host host(with_budget(8 << 20));
+/// The number of bytes that an OutOfBudget error says would do: the largest in it.
+uint64_t number_in(const std::string& message) {
+  uint64_t largest = 0;
+  for (size_t i = 0; i < message.size(); ++i) {
+    if (!std::isdigit(message[i])) continue;
+    size_t digits = 0;
+    largest = std::max<uint64_t>(largest, std::stoull(message.substr(i), &digits));
+    i += digits;
+  }
+  return largest;
+}
+
+TEST_F(RuntimeTest, AnInstanceThatDoesNotFitIsRefusedAtOnceWithTheNumberThatWouldDo) {
+  constexpr uint64_t kBudget = 4 << 20;
+  Host host(with_budget(kBudget));
   const AssetId asset = host.add(sphere());
-  host.plan(vec3(0, 0, 300));
-  const uint64_t before = hash_of_hits(host);
-  for (int i = 0; i < 50000; ++i) ASSERT_TRUE(host.runtime().add_instance(asset, mat4x3(1.0f)));
-  host.runtime().set_cameras({{vec3(0, 0, 2), 0.0f, 1e-3f}});
-  const auto plan = host.runtime().plan_frame();
-  ASSERT_FALSE(plan);
-  EXPECT_EQ(plan.error().code, ErrorCode::OutOfBudget);
-  EXPECT_EQ(hash_of_hits(host), before);
+  host.plan(vec3(0, 0, 3));
+  hash_of_hits(host);  // levels are loaded, and have to go
+  uint32_t count = 1;
+  Error error;
+  for (; count < 50000; ++count) {
+    const auto added = host.runtime().add_instance(asset, mat4x3(1.0f));
+    if (!added) {
+      error = added.error();
+      break;
+    }
+    ASSERT_EQ(added->value, count);
+  }
+  EXPECT_EQ(error.code, ErrorCode::OutOfBudget);
+  EXPECT_GT(count, 10000u);
+  EXPECT_LE(host.runtime().stats().peak_accounted_bytes, kBudget);
+  EXPECT_LE(host.plan(vec3(0, 0, 3)).planned_bytes, kBudget);  // what there is works on
+
+  const uint64_t enough = number_in(error.message);
+  EXPECT_EQ(*Runtime::least_budget({sphere().string(), (sphere() / ".").string()}, count + 1), enough);
+  for (const uint64_t budget : {enough, enough - 1}) {
+    Host other(with_budget(budget));
+    other.add(sphere(), std::vector<mat4x3>(count, mat4x3(1.0f)));
+    EXPECT_EQ(other.runtime().add_instance(asset, mat4x3(1.0f)).has_value(), budget == enough);
+  }
+  EXPECT_EQ(Runtime::least_budget({"/nowhere"}, 1).error().code, ErrorCode::NotFound);
+}
+
+// --- Instances that change -------------------------------------------------------------------------------------------
+
+mat4x3 at(const vec3& place, float scale = 1.0f) {
+  mat4x3 m(scale);
+  m[3] = place;
+  return m;
+}
+
+TEST_F(RuntimeTest, MovedHiddenAndRemovedInstancesAreSeenAsIfTheyHadNeverBeenElsewhere) {
+  const std::vector<mat4x3> places = {at({0, 0, 0}), at({0.5f, 0.5f, 0}, 0.4f), at({-0.7f, 0, 0.2f}, 0.5f)};
+  const auto hash = [](Host& host) {
+    host.plan(vec3(0, 0, 25));
+    return hash_of_hits(host, 0.02f);
+  };
+  Host changed;
+  const AssetId asset = changed.add(sphere(), {at({9, 9, 9}), places[1], at({0, 0, -3}, 7.0f)});
+  Runtime& runtime = changed.runtime();
+  hash(changed);
+  ASSERT_TRUE(runtime.move_instance(InstanceId{0}, places[0]));
+  ASSERT_TRUE(runtime.move_instance(InstanceId{2}, places[2]));
+  {
+    Host host;
+    host.add(sphere(), places);
+    EXPECT_EQ(hash(changed), hash(host));
+  }
+  ASSERT_TRUE(runtime.set_visible(InstanceId{1}, false));
+  {
+    Host host;  // ids are part of the hash: the hidden one is out of sight instead
+    host.add(sphere(), {places[0], at({1e6f, 0, 0}, 0.4f), places[2]});
+    EXPECT_EQ(hash(changed), hash(host));
+  }
+  ASSERT_TRUE(runtime.set_visible(InstanceId{1}, true));
+  ASSERT_TRUE(runtime.remove_instance(InstanceId{0}));
+  EXPECT_FALSE(runtime.remove_instance(InstanceId{0}));
+  EXPECT_FALSE(runtime.move_instance(InstanceId{0}, places[0]));
+  EXPECT_FALSE(runtime.set_visible(InstanceId{0}, true));
+  EXPECT_FALSE(runtime.move_instance(InstanceId{3}, places[0]));
+  EXPECT_FALSE(runtime.move_instance(InstanceId{1}, mat4x3(0.0f)));  // it stays where it was
+  {
+    Host host;
+    host.add(sphere(), {at({1e6f, 0, 0}), places[1], places[2]});
+    EXPECT_EQ(hash(changed), hash(host));
+  }
+  const uint64_t bytes = runtime.stats().accounted_bytes;
+  const auto again = runtime.add_instance(asset, places[0], {7, vec3(1.0f)});
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->value, 0u);
+  EXPECT_EQ(runtime.stats().accounted_bytes, bytes + sizeof(InstanceData));  // its data; the record was there
+  {
+    Host host;
+    host.add(sphere(), places);
+    EXPECT_EQ(hash(changed), hash(host));
+  }
+  const uint64_t loads = runtime.stats().levels_loaded;
+  ASSERT_TRUE(runtime.move_instance(InstanceId{1}, places[2]));
+  ASSERT_TRUE(runtime.move_instance(InstanceId{2}, places[1]));
+  hash(changed);
+  EXPECT_EQ(runtime.stats().levels_loaded, loads);  // nothing was built anew
+}
+
+TEST_F(RuntimeTest, PlansFollowWhatMovesComesAndIsHidden) {
+  Host host;
+  const AssetId asset = host.add(sphere(), {at({0, 0, 0}), at({0, 0, -5000})});
+  const auto finest = [&] { return host.plan(vec3(0, 0, 5)).finest_level[0]; };
+  EXPECT_EQ(finest(), 0u);
+  ASSERT_TRUE(host.runtime().set_visible(InstanceId{0}, false));
+  EXPECT_EQ(finest(), 5u);
+  ASSERT_TRUE(host.runtime().move_instance(InstanceId{1}, at({0, 0, -60})));
+  EXPECT_EQ(finest(), 1u);
+  ASSERT_TRUE(host.runtime().add_instance(asset, at({0, 0, 0})));
+  EXPECT_EQ(finest(), 0u);
+  ASSERT_TRUE(host.runtime().remove_instance(InstanceId{2}));
+  for (int i = 0; i < 3000; ++i) ASSERT_TRUE(host.runtime().move_instance(InstanceId{1}, at({0, 0, -5000})));
+  EXPECT_EQ(finest(), 5u);
+  ASSERT_TRUE(host.runtime().remove_instance(InstanceId{1}));
+  finest();
+  RayContext context;
+  EmbreeRayHit hit;
+  EXPECT_FALSE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));  // all are hidden or removed
 }
 
 // --- What rays see ---------------------------------------------------------------------------------------------------
