@@ -46,8 +46,8 @@ float largest_stretch(const mat4x3& local_to_world);
 Box3 instance_bounds(const InstanceRecord& instance, const TracedAsset& asset);
 
 /// Instances and assets, and the callbacks that Embree calls for them. Rays may run from any thread while nobody
-/// changes the tables. Single-ray queries must pass a RayContext's `embree` member as context; the scene must not be
-/// instanced itself.
+/// changes the tables. Queries should pass the `embree` member of a RayContext or of RayContexts as context; the scene
+/// must not be instanced itself.
 class InstanceGeometry {
  public:
   explicit InstanceGeometry(LevelSource& source) : source_(source) {}
@@ -55,6 +55,7 @@ class InstanceGeometry {
   std::vector<InstanceRecord> instances;
   std::vector<const TracedAsset*> assets;  ///< InstanceRecord::asset indexes it
   std::optional<float> forced_lambda;
+  bool has_filters = false;  ///< RuntimeOptions::has_geometry_filters
   std::vector<bool> hidden;  ///< per instance, up to the last that no ray meets
 
   bool is_hidden(uint32_t instance) const { return instance < hidden.size() && hidden[instance]; }
@@ -72,6 +73,8 @@ class InstanceGeometry {
   static void occluded_callback(const RTCOccludedFunctionNArguments* args);
 
   struct Visit;
+  struct Query;
+  bool intersect_filtered(const Query& query, EmbreeRayHit& ray_hit, HitRecord* record) const;
   bool enter(uint32_t instance, const EmbreeRay& ray, const RayContext& context, Visit& visit) const;
   bool intersect(uint32_t instance, unsigned geometry_id, EmbreeRayHit& ray_hit, const RayContext& context,
                  EmbreeContext* embree_context, HitRecord* record) const;

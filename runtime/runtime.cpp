@@ -60,6 +60,7 @@ struct Runtime::Impl {
         planner(options, geometry),
         host(host_device) {
     geometry.forced_lambda = options.forced_lambda;
+    geometry.has_filters = options.has_geometry_filters;
   }
 
   /// Tells the budget what so many instances take, of which the first `with_data` have data of the host's. The room

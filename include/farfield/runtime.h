@@ -70,7 +70,12 @@ struct RuntimeOptions {
   float pixel_error = 1.0f;            ///< pixels: how wide the voxels of a level may look; the budget aside. > 0
   std::optional<float> forced_lambda;  ///< every ray sees this lambda, whatever its footprint; for evaluation
   uint32_t scene_bytes_per_instance = kSceneBytesPerInstance;  ///< of the scene that attach() will be given
-  MessageSink messages;                                        ///< may be empty
+  /// The host has given our geometry filter functions (rtcSetGeometryIntersectFilterFunction with the geometry of
+  /// geometry_id()): they are called for our hits, and occlusion queries look for nearest hits then, which costs. A
+  /// filter in the query's context is called without this. Filters get one ray and its nearest hit in an instance, as
+  /// rtcIntersect1 would return it; what they refuse, the ray passes, and goes on behind it.
+  bool has_geometry_filters = false;
+  MessageSink messages;  ///< may be empty
 };
 
 struct AssetId {
