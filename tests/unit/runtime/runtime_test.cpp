@@ -817,6 +817,43 @@ TEST_F(RuntimeTest, InteractionsSayWhereAndHow) {
   EXPECT_NEAR(host.interaction(hit, context).geometric_normal.z, 1.0f, 0.01f);
 }
 
+TEST_F(RuntimeTest, InteractionsSayWhatTheirLightMeets) {
+  const TemporaryFolder folder;
+  std::vector<LevelData> levels = white_sphere();
+  const SymMat3 flat = SymMat3::outer(vec3(0, 0, 1)) + SymMat3::identity() * 0.01f;
+  levels[4] = test::empty_level(5, levels[4].header.resolution);
+  test::set_volume(
+      levels[4], ivec3(1), vec3(-2.56f), [](int, int, int) { return 50.0f; }, [&](int, int, int) { return flat; });
+  set_diffuse(levels[4], vec3(0.25f, 0.5f, 0.75f));
+  write_asset(folder.path() / "a.farfield", levels);
+  const auto at_lambda = [&](float lambda, const mat4x3& place) {
+    Host host(with_lambda(lambda));
+    host.add(folder.path() / "a.farfield", {place});
+    host.plan();
+    RayContext context;
+    EmbreeRayHit hit;
+    EXPECT_TRUE(host.trace({0.1f, 0.2f, 20}, {0, 0, -1}, context, hit));
+    return host.interaction(hit, context);
+  };
+  const Interaction surface = at_lambda(0, mat4x3(1.0f));
+  ASSERT_EQ(surface.kind, Interaction::Kind::Surface);
+  EXPECT_EQ(surface.reflectance.diffuse, vec3(1.0f));
+  EXPECT_EQ(surface.reflectance.specular, vec3(0.0f));
+  EXPECT_EQ(surface.reflectance.sggx[0], 0.0f);
+
+  const mat4x3 turned(vec3(0, 0, 1), vec3(0, 1, 0), vec3(-1, 0, 0), vec3(0.0f));  // z becomes -x
+  for (const bool is_turned : {false, true}) {
+    const Interaction volume = at_lambda(5, is_turned ? turned : mat4x3(1.0f));
+    ASSERT_EQ(volume.kind, Interaction::Kind::Volume);
+    EXPECT_NEAR(volume.reflectance.diffuse.y, 0.5f, 0.01f);
+    EXPECT_EQ(volume.reflectance.self_shadowing, 1.0f);
+    const float* s = volume.reflectance.sggx;
+    EXPECT_NEAR(s[0] + s[1] + s[2], 1.0f, 1e-4f);
+    EXPECT_GT(s[is_turned ? 0 : 2], 0.9f);
+    EXPECT_LT(s[is_turned ? 2 : 0], 0.1f);
+  }
+}
+
 TEST_F(RuntimeTest, HitsThatAreNotOursOrHaveGoneAreBlackAndSaidOnce) {
   Host host;
   host.add(sphere());
