@@ -95,7 +95,7 @@ bool are_same_bake(const Manifest& a, const Manifest& b) {
 /// Whether every level's and texture's file is the one that the manifest means.
 bool is_whole(const fs::path& asset, const Manifest& manifest) {
   const bool has_levels = std::ranges::all_of(manifest.levels, [&](const LevelEntry& entry) {
-    const auto file = LevelFile::open_known(asset / entry.file, entry.file_hash);
+    const auto file = LevelFile::open_known(asset / entry.file, entry.file_bytes, entry.file_hash);
     return file && (*file)->file_bytes() == entry.file_bytes;
   });
   return has_levels && std::ranges::all_of(manifest.textures, [&](const AssetTexture& texture) {

@@ -12,7 +12,8 @@
 
 namespace farfield {
 
-Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, EmbreeFilter filter, void* user) {
+Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, uint64_t most_bytes,
+                                     EmbreeFilter filter, void* user) {
   LevelScene result;
   if (!level.has_surface()) return result;
   const auto make = [&] {
@@ -24,16 +25,14 @@ Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, 
     if (filter) set_filter(quads, filter, user);
     return geometries;
   };
-  FARFIELD_TRY_LET(result.built_,
-                   build_measured_scene(device, make, fmt::format("build a BVH of {} quads", level.quads.size())));
+  FARFIELD_TRY_LET(result.built_, build_measured_scene(device, make, most_bytes,
+                                                       fmt::format("the BVH of {} quads", level.quads.size())));
   return result;
 }
 
 LevelCost level_cost(const LevelView& level, const LevelScene& scene) {
-  // Checking the file has mapped all of it. What is not given back stays mapped and so never faults again, which would
-  // bring its neighbours back.
   const LevelFileSizes file = level_file_sizes(level);
-  return {file.mapped_bytes - file.build_only_bytes + scene.bytes(), file.build_only_bytes + scene.build_peak_bytes()};
+  return {file.memory_bytes - file.build_only_bytes + scene.bytes(), file.build_only_bytes + scene.build_peak_bytes()};
 }
 
 Result<LevelCost> measure_level_scene(BvhDevice& device, const LevelView& level) {

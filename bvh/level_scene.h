@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include "base/embree.h"
 #include "base/result.h"
@@ -16,12 +17,12 @@ namespace farfield {
 class LevelScene {
  public:
   LevelScene() = default;
-  /// The level's arrays are shared, not copied: they stay mapped until this is destroyed, but only this call reads
-  /// them. Four bytes after the last position must be readable (level files see to that), because Embree loads vertices
-  /// 16 bytes at a time. `filter`, if there is one, is asked about every hit, with `user`. Errors: those of
-  /// build_measured_scene().
-  static Result<LevelScene> build(BvhDevice& device, const LevelView& level, EmbreeFilter filter = nullptr,
-                                  void* user = nullptr);
+  /// The level's arrays are shared, not copied: they stay where they are until this is destroyed, but only this call
+  /// reads them. Four bytes after the last position must be readable (level files see to that), because Embree loads
+  /// vertices 16 bytes at a time. `filter`, if there is one, is asked about every hit, with `user`. most_bytes, errors:
+  /// those of build_measured_scene().
+  static Result<LevelScene> build(BvhDevice& device, const LevelView& level, uint64_t most_bytes = kAnyBytes,
+                                  EmbreeFilter filter = nullptr, void* user = nullptr);
 
   EmbreeSceneRef handle() const { return built_.scene.get(); }  ///< null without a surface
   uint64_t bytes() const { return built_.bytes; }
@@ -31,7 +32,7 @@ class LevelScene {
   MeasuredScene built_;
 };
 
-/// The cost of a level in a mapped file whose build pages were released (LevelFile::release_build_pages), with `scene`.
+/// The cost of a level in a LevelFile whose build pages were released (LevelFile::release_build_pages), with `scene`.
 LevelCost level_cost(const LevelView& level, const LevelScene& scene);
 
 /// Measures a level as the runtime would load it, by building its BVH once. Errors: those of LevelScene::build.

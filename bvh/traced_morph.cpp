@@ -191,7 +191,7 @@ struct TracedMorph::SortedFaces {
 };
 
 Result<std::unique_ptr<TracedMorph>> TracedMorph::make(BvhDevice& device, const LevelView& fine,
-                                                       const LevelView& coarse) {
+                                                       const LevelView& coarse, uint64_t most_bytes) {
   std::unique_ptr<TracedMorph> morph(new TracedMorph);
   std::vector<uint32_t>& targets = morph->coarse_face_;
   targets.assign(coarse.morph_face.begin(), coarse.morph_face.end());
@@ -212,22 +212,23 @@ Result<std::unique_ptr<TracedMorph>> TracedMorph::make(BvhDevice& device, const 
     }
     return geometries;
   };
-  FARFIELD_TRY_LET(morph->built_, build_measured_scene(device, make_geometries,
-                                                       fmt::format("build a morph of {} faces", faces.count())));
+  const uint64_t left = most_bytes - std::min(most_bytes, morph->making_bytes_);
+  FARFIELD_TRY_LET(morph->built_, build_measured_scene(device, make_geometries, left,
+                                                       fmt::format("the morph of {} faces", faces.count())));
   return morph;
 }
 
 Result<std::unique_ptr<TracedMorph>> TracedMorph::build(BvhDevice& device, const LevelView& fine_level,
                                                         const LevelView& coarse_level, const TracedLevel& fine,
-                                                        const TracedLevel& coarse) {
-  FARFIELD_TRY_LET(auto morph, make(device, fine_level, coarse_level));
+                                                        const TracedLevel& coarse, uint64_t most_bytes) {
+  FARFIELD_TRY_LET(auto morph, make(device, fine_level, coarse_level, most_bytes));
   morph->fine_ = &fine;
   morph->coarse_ = &coarse;
   return morph;
 }
 
 LevelCost TracedMorph::cost(const LevelView& fine_level, const LevelView& coarse_level) const {
-  const uint64_t files = level_file_sizes(fine_level).mapped_bytes + level_file_sizes(coarse_level).mapped_bytes;
+  const uint64_t files = level_file_sizes(fine_level).memory_bytes + level_file_sizes(coarse_level).memory_bytes;
   uint64_t tables = coarse_face_.size() * sizeof(uint32_t) + sizeof(TracedMorph);
   for (const std::vector<uint32_t>& elements : elements_) tables += elements.size() * sizeof(uint32_t);
   return {built_.bytes + tables, built_.build_peak_bytes + making_bytes_ + files};
@@ -235,7 +236,7 @@ LevelCost TracedMorph::cost(const LevelView& fine_level, const LevelView& coarse
 
 Result<LevelCost> measure_morph(const LevelView& fine, const LevelView& coarse) {
   FARFIELD_TRY_LET(const auto device, BvhDevice::create());
-  FARFIELD_TRY_LET(const auto morph, TracedMorph::make(*device, fine, coarse));
+  FARFIELD_TRY_LET(const auto morph, TracedMorph::make(*device, fine, coarse, kAnyBytes));
   return morph->cost(fine, coarse);
 }
 

@@ -29,10 +29,10 @@ struct MorphHit {
 class TracedMorph {
  public:
   /// Builds the BVH from whole levels, of whose arrays it copies what it needs. `fine` and `coarse` are the same levels
-  /// as rays see them, and outlive this. Errors: those of build_measured_scene().
+  /// as rays see them, and outlive this. most_bytes, errors: those of build_measured_scene().
   static Result<std::unique_ptr<TracedMorph>> build(BvhDevice& device, const LevelView& fine_level,
                                                     const LevelView& coarse_level, const TracedLevel& fine,
-                                                    const TracedLevel& coarse);
+                                                    const TracedLevel& coarse, uint64_t most_bytes = kAnyBytes);
   TracedMorph(const TracedMorph&) = delete;
   TracedMorph& operator=(const TracedMorph&) = delete;
 
@@ -55,7 +55,7 @@ class TracedMorph {
   struct SortedFaces;
   TracedMorph() = default;
   static Result<std::unique_ptr<TracedMorph>> make(BvhDevice& device, const LevelView& fine_level,
-                                                   const LevelView& coarse_level);
+                                                   const LevelView& coarse_level, uint64_t most_bytes);
   friend Result<LevelCost> measure_morph(const LevelView& fine, const LevelView& coarse);
 
   std::optional<VolumeHit> first_collision(const LocalRay& ray, float t, uint64_t ray_bits, bool& is_coarser) const;

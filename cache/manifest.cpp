@@ -9,6 +9,7 @@
 
 #include "base/file_io.h"
 #include "base/hash.h"
+#include "base/json_words.h"
 #include "cache/json_reader.h"
 #include "cache/material_json.h"
 
@@ -290,6 +291,23 @@ std::string manifest_to_json(const Manifest& manifest) {
   return json.dump(2, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
 }
 
+namespace {
+
+constexpr std::string_view kTextEnd = "\n}\n";
+constexpr std::string_view kChecksumBegin = ",\n  \"checksum\": \"";
+
+/// How a text ends that has the hash of all that comes before.
+std::string end_with_checksum(std::string_view body) {
+  return fmt::format("{}{}\"{}", kChecksumBegin, to_hex(hash_values(std::span(body))), kTextEnd);
+}
+
+bool is_checksum_right(std::string_view text) {
+  const size_t end = text.rfind(kChecksumBegin);
+  return end != std::string_view::npos && text.substr(end) == end_with_checksum(text.substr(0, end));
+}
+
+}  // namespace
+
 Result<Manifest> manifest_from_json(std::string_view text, std::string_view name) {
   const auto broken = [&](std::string_view problem) {
     return make_error(ErrorCode::BadFile, fmt::format("broken manifest {}: {}; bake the asset again", name, problem));
@@ -299,7 +317,7 @@ Result<Manifest> manifest_from_json(std::string_view text, std::string_view name
   try {
     json = Json::parse(text);
   } catch (const Json::exception& error) {  // the only way to learn where the syntax is wrong
-    return broken(printable(error.what()));
+    return broken(printable(json_words(error.what())));
   }
 
   FieldReader read;
@@ -310,10 +328,15 @@ Result<Manifest> manifest_from_json(std::string_view text, std::string_view name
                                   name, version, kFormatVersion));
   }
   if (!read.problem && version == 0) read.problem = "the format version is 0";
+  const bool has_checksum = json.contains("checksum");
+  if (!read.problem && has_checksum && !is_checksum_right(text)) {
+    read.problem = "its checksum is wrong, it was changed since it was written";
+  }
   Manifest manifest = manifest_from_json(json, read);
   if (!read.problem) read.problem = find_problem(manifest);
   if (read.problem) return broken(*read.problem);
   manifest.version = static_cast<int>(version);
+  manifest.has_checksum = has_checksum;
   return manifest;
 }
 
@@ -344,7 +367,9 @@ Result<void> write_manifest(const fs::path& asset_dir, const Manifest& manifest)
   if (const Problem problem = find_problem(manifest)) {
     return make_error(ErrorCode::InvalidArgument, fmt::format("cannot write {}: {}", path.string(), *problem));
   }
-  const std::string text = manifest_to_json(manifest);
+  std::string text = manifest_to_json(manifest);
+  text.resize(text.size() - kTextEnd.size());
+  text += end_with_checksum(text);
   const std::span<const std::byte> bytes = std::as_bytes(std::span(text));
   return write_file_atomically(path, std::span(&bytes, 1));
 }

@@ -97,6 +97,20 @@ MainNormal main_normal(const SymMat3& s, const vec3& start) {
   return {normal, roughness2_of_spread(aside)};
 }
 
+void set_sggx(Reflectance& reflectance, const SymMat3& s) {
+  const float entries[] = {s.xx, s.yy, s.zz, s.xy, s.xz, s.yz};
+  std::ranges::copy(entries, reflectance.sggx);
+}
+
+/// What faces and flakes have in common.
+template <typename Params>
+void set_reflectance(Reflectance& reflectance, const Params& params) {
+  reflectance.diffuse = params.diffuse;
+  reflectance.specular = params.specular;
+  reflectance.transmission = params.transmission;
+  reflectance.roughness = std::sqrt(std::sqrt(params.roughness2));
+}
+
 /// On wo's side of the surface, and not beyond its own horizon.
 vec3 visible_normal(vec3 normal, const vec3& geometric_normal, const vec3& wo) {
   constexpr float kLeastCosine = 0.02f;
@@ -219,6 +233,7 @@ SurfaceParams shade_surface(const HitLevels& levels, const InstanceRecord& insta
     }
   }
   if (normals) {
+    set_sggx(interaction.reflectance, *normals);
     const MainNormal main = main_normal(*normals, normal);
     normal = main.normal;
     params.roughness2 = std::min(params.roughness2 + main.roughness2, 1.0f);
@@ -253,6 +268,9 @@ Interaction make_interaction(const HitLevels& levels, const InstanceRecord& inst
   if (hit.is_volume) {
     interaction.kind = Interaction::Kind::Volume;
     const FlakeParams params = flake_params(view, instance, hit.element);
+    set_reflectance(interaction.reflectance, params);
+    set_sggx(interaction.reflectance, params.sggx);
+    interaction.reflectance.self_shadowing = params.self_shadowing;
     interaction.albedo = layered_albedo(params.specular, params.diffuse + params.transmission);
     interaction.emission = emission_at(view.voxel_emission, hit.element);
     InteractionModel::put(interaction, InteractionModel(FlakePhase(params, interaction.wo)));
@@ -263,6 +281,7 @@ Interaction make_interaction(const HitLevels& levels, const InstanceRecord& inst
   const vec3 normal = glm::normalize(instance.normal_to_world(glm::normalize(normal_local)));
   interaction.geometric_normal = glm::dot(normal, interaction.wo) < 0.0f ? -normal : normal;
   const SurfaceParams params = shade_surface(levels, instance, hit, direction, interaction);
+  set_reflectance(interaction.reflectance, params);
   interaction.albedo = layered_albedo(params.specular, params.diffuse + params.transmission);
   InteractionModel::put(interaction,
                         InteractionModel(SurfaceBsdf(params, interaction.shading_normal, interaction.wo),

@@ -88,6 +88,7 @@ Result<uint32_t> LevelStore::open(const std::filesystem::path& folder, MaterialF
   asset->traced.blend_window = blend_window_;
   asset->traced.finest_blended = std::exp2(-blend_window_);
   asset->traced.usable_slots = {static_cast<uint8_t>(asset->traced.slot_count() - 1)};  // until a plan says otherwise
+  table_bytes_ += asset->table_bytes();
   assets_.push_back(std::move(asset));
   levels_.set_other_bytes(fixed_bytes() + texture_bytes_);
   return static_cast<uint32_t>(assets_.size() - 1);
@@ -95,8 +96,8 @@ Result<uint32_t> LevelStore::open(const std::filesystem::path& folder, MaterialF
 
 void LevelStore::add_item(OpenAsset& asset, uint32_t slot, bool is_morph, std::vector<size_t>& numbers) {
   ResidencyItem item = is_morph ? make_morph_item(asset, slot, *device_) : make_level_item(asset, slot, *device_);
-  item.load = [this, load = std::move(item.load)] {
-    Result<LoadedItem> loaded = load();
+  item.load = [this, load = std::move(item.load)](uint64_t bytes_left) {
+    Result<LoadedItem> loaded = load(bytes_left);
     if (loaded) count_freed(loaded->build_peak_bytes);
     return loaded;
   };
@@ -127,7 +128,7 @@ void LevelStore::add_items(OpenAsset& asset) {
 Result<void> LevelStore::load_root(OpenAsset& asset) {
   add_items(asset);
   // Roots come first: what an earlier plan has loaded beside them may be in the way, and the next plan decides anew.
-  FARFIELD_TRY_LET(const auto plan, plan_roots(asset));
+  FARFIELD_TRY_LET(const auto plan, plan_roots(&asset));
   const size_t root = asset.items.back();
   const uint64_t needed = levels_.resident_bytes(root) + levels_.build_peak_bytes(root) + asset.table_bytes();
   if (levels_.stats().accounted_bytes + needed > budget_bytes_) apply(plan, 0);
@@ -140,14 +141,39 @@ Result<void> LevelStore::load_root(OpenAsset& asset) {
   return {};
 }
 
-/// The plan in which all assets have nothing but their roots.
-Result<Plan> LevelStore::plan_roots(const OpenAsset& newcomer) const {
+/// The plan in which all assets, and the one that is being opened, have nothing but their roots.
+Result<Plan> LevelStore::plan_roots(const OpenAsset* newcomer) const {
   std::vector<PlanAsset> wanted;
   for (const auto& asset : assets_) wanted.push_back(plan_asset(*asset));
-  wanted.push_back(plan_asset(newcomer));
-  auto plan = plan_levels(wanted, budget_bytes_, fixed_bytes() + newcomer.table_bytes());
-  if (plan) plan->usable.pop_back();  // apply() knows the newcomer not yet
+  if (newcomer) wanted.push_back(plan_asset(*newcomer));
+  auto plan = plan_levels(wanted, budget_bytes_, fixed_bytes() + (newcomer ? newcomer->table_bytes() : 0));
+  if (plan && newcomer) plan->usable.pop_back();  // apply() knows it not yet
   return plan;
+}
+
+Result<void> LevelStore::set_instance_bytes(uint64_t bytes) {
+  if (levels_.stats().accounted_bytes - instance_bytes_ + bytes > budget_bytes_) {
+    const uint64_t former = std::exchange(instance_bytes_, bytes);
+    const Result<Plan> roots = plan_roots(nullptr);
+    instance_bytes_ = former;
+    if (!roots) return tl::unexpected(roots.error());
+    apply(*roots, 0);
+  }
+  instance_bytes_ = bytes;
+  levels_.set_other_bytes(fixed_bytes() + texture_bytes_);
+  return {};
+}
+
+Result<uint64_t> LevelStore::least_bytes(std::span<const std::filesystem::path> folders, uint64_t instance_bytes) {
+  Messages silent({});
+  TextureCache textures(silent);
+  uint64_t bytes = kRuntimeBytes + instance_bytes, largest_peak = 0;
+  for (const std::filesystem::path& folder : folders) {
+    FARFIELD_TRY_LET(const auto asset, read_asset(folder, {}, textures));
+    bytes += asset->table_bytes() + asset->levels.back().resident_bytes;
+    largest_peak = std::max(largest_peak, asset->build_peak_bytes.back());
+  }
+  return bytes + largest_peak;
 }
 
 PlanAsset LevelStore::plan_asset(const OpenAsset& asset) const {
@@ -222,11 +248,7 @@ void LevelStore::load(uint32_t asset, uint32_t slot) {
 
 void LevelStore::load_morph(uint32_t asset, uint32_t slot) { serve_morph(asset, slot); }
 
-uint64_t LevelStore::fixed_bytes() const {
-  uint64_t bytes = kRuntimeBytes + instance_bytes_;
-  for (const auto& asset : assets_) bytes += asset->table_bytes();
-  return bytes;
-}
+uint64_t LevelStore::fixed_bytes() const { return kRuntimeBytes + instance_bytes_ + table_bytes_; }
 
 /// Builds and releases leave holes in the heap, which `ps` still counts.
 void LevelStore::count_freed(uint64_t bytes) {

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/result.h"
@@ -37,10 +38,13 @@ class LevelStore final : public LevelSource {
   size_t asset_count() const { return assets_.size(); }
   const OpenAsset& asset(uint32_t i) const { return *assets_[i]; }
 
-  /// What all instances take, here and in the host's scene.
-  void set_instance_bytes(uint64_t bytes) { instance_bytes_ = bytes; }
+  /// What all instances take, here and in the host's scene. Where that has no room beside what is loaded, all but the
+  /// roots is given back. Errors: OutOfBudget (the former number stays).
+  Result<void> set_instance_bytes(uint64_t bytes);
   /// What the budget pays for besides levels and textures.
   uint64_t fixed_bytes() const;
+  /// A budget for these (canonical) folders and instances that take so many bytes. Errors: those of read_asset.
+  static Result<uint64_t> least_bytes(std::span<const std::filesystem::path> folders, uint64_t instance_bytes);
 
   /// What the cache of textures wants if the plan shows textured sources up close; 0 if it does not.
   uint64_t wanted_texture_bytes(const Plan& plan) const;
@@ -75,7 +79,7 @@ class LevelStore final : public LevelSource {
   const TracedLevel* find_level(OpenAsset& asset, uint32_t slot, bool& may_ask);
   /// An item that is there, or that may be waited for; else it is asked for, if may_ask, which is false from then on.
   const Resident* find(size_t item, bool& may_ask);
-  Result<Plan> plan_roots(const OpenAsset& newcomer) const;
+  Result<Plan> plan_roots(const OpenAsset* newcomer) const;
   void count_freed(uint64_t bytes);
   void report_broken(size_t item, const Error& error);
 
@@ -87,6 +91,7 @@ class LevelStore final : public LevelSource {
   TextureCache textures_;
   uint64_t texture_bytes_ = 0;  ///< that the plan in force gives textures_
   uint64_t instance_bytes_ = 0;
+  uint64_t table_bytes_ = 0;  ///< of assets_
   std::unique_ptr<BvhDevice> device_;
   std::vector<std::unique_ptr<OpenAsset>> assets_;
   std::vector<std::unique_ptr<OpenAsset>> refused_;  ///< did not open; items of levels_ refer to them

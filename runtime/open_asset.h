@@ -18,7 +18,7 @@
 
 namespace farfield {
 
-/// A level in memory: its mapped file and what rays need of it.
+/// A level in memory: its file's bytes and what rays need of it.
 struct LoadedLevel : Resident {
   std::unique_ptr<LevelFile> file;  ///< first, so that it outlives the BVH over its arrays
   std::unique_ptr<TracedLevel> traced;
@@ -58,7 +58,7 @@ struct OpenAsset {
 Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folder, MaterialFunction materials,
                                               TextureCache& textures);
 
-/// What loads level `slot` of `asset`: maps the file, checks all of it, builds the BVH and gives back what only that
+/// What loads level `slot` of `asset`: reads the file, checks all of it, builds the BVH and gives back what only that
 /// needed. Refers to the arguments.
 ResidencyItem make_level_item(const OpenAsset& asset, uint32_t slot, BvhDevice& device);
 /// What loads the morph from level `slot` to the next, which the manifest has the cost of; both levels are loaded

@@ -64,7 +64,7 @@ void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std:
                    "else 24")
       ->check(CLI::Range(0.001, 1e6));
   command->add_option("--exposure", options.exposure_stops, "Of the PNG previews, in stops")
-      ->check(CLI::Range(-50, 50));
+      ->check(CLI::Range(-50.0, 50.0));
   add_parsed_option(command, "--assemblies", options.assemblies, parse_assembly_rule,
                     "What is baked as one: trees of several meshes that the scene repeats, or only what it marks, or "
                     "nothing: repeated, marked, none")

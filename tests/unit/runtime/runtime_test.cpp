@@ -196,6 +196,44 @@ TEST_F(RuntimeTest, AManifestThatPromisesLessThanItsFilesIsRefused) {
   EXPECT_NE(asset.error().message.find("level 1"), std::string::npos) << asset.error().message;
 }
 
+TEST_F(RuntimeTest, ALoadNeverTakesMoreThanTheBudgetHoweverTheManifestLies) {
+  const auto liar = copy("small_liar.farfield");
+  Manifest manifest = *read_manifest(liar);
+  LevelEntry& finest = manifest.levels[0];
+  const uint64_t truth = finest.resident_bytes + finest.build_peak_bytes;
+  finest.resident_bytes = finest.file_bytes, finest.build_peak_bytes = 0;
+  ASSERT_TRUE(write_manifest(liar, manifest));
+  ASSERT_GT(truth, finest.file_bytes * 3 / 2);
+  const uint64_t budget = finest.file_bytes + (truth - finest.file_bytes) / 2;
+  Host host(with_budget(budget));
+  host.add(liar);
+  EXPECT_EQ(host.plan(vec3(0, 0, 2)).finest_level[0], 0u) << "the plan believes the manifest";
+  hash_of_hits(host);
+  EXPECT_LE(host.runtime().stats().peak_accounted_bytes, budget);
+  ASSERT_EQ(host.messages.size(), 1u);
+  EXPECT_NE(host.messages[0].find("level_0.ffl: the BVH of"), std::string::npos) << host.messages[0];
+  EXPECT_NE(host.messages[0].find("farfield verify"), std::string::npos) << host.messages[0];
+  EXPECT_GT(host.runtime().stats().fallbacks, 0u);
+}
+
+TEST_F(RuntimeTest, AHullThatWouldCutALevelIsRefused) {
+  const auto cut = copy("cut_hull.farfield");
+  Manifest manifest = *read_manifest(cut);
+  for (int i = 0; i < 8; ++i) manifest.hull.push_back(manifest.bounds.corner(i));
+  ASSERT_TRUE(write_manifest(cut, manifest));
+  {
+    Host host;
+    EXPECT_TRUE(host.runtime().open_asset(cut.string()));
+  }
+  for (vec3& point : manifest.hull) point *= 0.1f;
+  ASSERT_TRUE(write_manifest(cut, manifest));
+  Host host;
+  const auto asset = host.runtime().open_asset(cut.string());
+  ASSERT_FALSE(asset);
+  EXPECT_EQ(asset.error().code, ErrorCode::BadFile);
+  EXPECT_NE(asset.error().message.find("sticks out of the hull"), std::string::npos) << asset.error().message;
+}
+
 TEST_F(RuntimeTest, AssetsCanBeOpenedWhileTheLoaderWorks) {
   RuntimeOptions options;
   options.residency = Residency::Progressive;
@@ -461,17 +499,128 @@ TEST_F(RuntimeTest, ALevelThatDidNotFitIsLoadedOnceAPlanHasRoom) {
   EXPECT_EQ(level_seen_at(far), 0u);
 }
 
-TEST_F(RuntimeTest, AFailedPlanLeavesTheFormerOne) {
-  Host host(with_budget(8 << 20));
+/// The number of bytes that an OutOfBudget error says would do: the largest in it.
+uint64_t number_in(const std::string& message) {
+  uint64_t largest = 0;
+  for (size_t i = 0; i < message.size(); ++i) {
+    if (!std::isdigit(message[i])) continue;
+    size_t digits = 0;
+    largest = std::max<uint64_t>(largest, std::stoull(message.substr(i), &digits));
+    i += digits;
+  }
+  return largest;
+}
+
+TEST_F(RuntimeTest, AnInstanceThatDoesNotFitIsRefusedAtOnceWithTheNumberThatWouldDo) {
+  constexpr uint64_t kBudget = 4 << 20;
+  Host host(with_budget(kBudget));
   const AssetId asset = host.add(sphere());
-  host.plan(vec3(0, 0, 300));
-  const uint64_t before = hash_of_hits(host);
-  for (int i = 0; i < 50000; ++i) ASSERT_TRUE(host.runtime().add_instance(asset, mat4x3(1.0f)));
-  host.runtime().set_cameras({{vec3(0, 0, 2), 0.0f, 1e-3f}});
-  const auto plan = host.runtime().plan_frame();
-  ASSERT_FALSE(plan);
-  EXPECT_EQ(plan.error().code, ErrorCode::OutOfBudget);
-  EXPECT_EQ(hash_of_hits(host), before);
+  host.plan(vec3(0, 0, 3));
+  hash_of_hits(host);  // levels are loaded, and have to go
+  uint32_t count = 1;
+  Error error;
+  for (; count < 50000; ++count) {
+    const auto added = host.runtime().add_instance(asset, mat4x3(1.0f));
+    if (!added) {
+      error = added.error();
+      break;
+    }
+    ASSERT_EQ(added->value, count);
+  }
+  EXPECT_EQ(error.code, ErrorCode::OutOfBudget);
+  EXPECT_GT(count, 10000u);
+  EXPECT_LE(host.runtime().stats().peak_accounted_bytes, kBudget);
+  EXPECT_LE(host.plan(vec3(0, 0, 3)).planned_bytes, kBudget);  // what there is works on
+
+  const uint64_t enough = number_in(error.message);
+  EXPECT_EQ(*Runtime::least_budget({sphere().string(), (sphere() / ".").string()}, count + 1), enough);
+  for (const uint64_t budget : {enough, enough - 1}) {
+    Host other(with_budget(budget));
+    other.add(sphere(), std::vector<mat4x3>(count, mat4x3(1.0f)));
+    EXPECT_EQ(other.runtime().add_instance(asset, mat4x3(1.0f)).has_value(), budget == enough);
+  }
+  EXPECT_EQ(Runtime::least_budget({"/nowhere"}, 1).error().code, ErrorCode::NotFound);
+}
+
+// --- Instances that change -------------------------------------------------------------------------------------------
+
+mat4x3 at(const vec3& place, float scale = 1.0f) {
+  mat4x3 m(scale);
+  m[3] = place;
+  return m;
+}
+
+TEST_F(RuntimeTest, MovedHiddenAndRemovedInstancesAreSeenAsIfTheyHadNeverBeenElsewhere) {
+  const std::vector<mat4x3> places = {at({0, 0, 0}), at({0.5f, 0.5f, 0}, 0.4f), at({-0.7f, 0, 0.2f}, 0.5f)};
+  const auto hash = [](Host& host) {
+    host.plan(vec3(0, 0, 25));
+    return hash_of_hits(host, 0.02f);
+  };
+  Host changed;
+  const AssetId asset = changed.add(sphere(), {at({9, 9, 9}), places[1], at({0, 0, -3}, 7.0f)});
+  Runtime& runtime = changed.runtime();
+  hash(changed);
+  ASSERT_TRUE(runtime.move_instance(InstanceId{0}, places[0]));
+  ASSERT_TRUE(runtime.move_instance(InstanceId{2}, places[2]));
+  {
+    Host host;
+    host.add(sphere(), places);
+    EXPECT_EQ(hash(changed), hash(host));
+  }
+  ASSERT_TRUE(runtime.set_visible(InstanceId{1}, false));
+  {
+    Host host;  // ids are part of the hash: the hidden one is out of sight instead
+    host.add(sphere(), {places[0], at({1e6f, 0, 0}, 0.4f), places[2]});
+    EXPECT_EQ(hash(changed), hash(host));
+  }
+  ASSERT_TRUE(runtime.set_visible(InstanceId{1}, true));
+  ASSERT_TRUE(runtime.remove_instance(InstanceId{0}));
+  EXPECT_FALSE(runtime.remove_instance(InstanceId{0}));
+  EXPECT_FALSE(runtime.move_instance(InstanceId{0}, places[0]));
+  EXPECT_FALSE(runtime.set_visible(InstanceId{0}, true));
+  EXPECT_FALSE(runtime.move_instance(InstanceId{3}, places[0]));
+  EXPECT_FALSE(runtime.move_instance(InstanceId{1}, mat4x3(0.0f)));  // it stays where it was
+  {
+    Host host;
+    host.add(sphere(), {at({1e6f, 0, 0}), places[1], places[2]});
+    EXPECT_EQ(hash(changed), hash(host));
+  }
+  const uint64_t bytes = runtime.stats().accounted_bytes;
+  const auto again = runtime.add_instance(asset, places[0], {7, vec3(1.0f)});
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->value, 0u);
+  EXPECT_EQ(runtime.stats().accounted_bytes, bytes + sizeof(InstanceData));  // its data; the record was there
+  {
+    Host host;
+    host.add(sphere(), places);
+    EXPECT_EQ(hash(changed), hash(host));
+  }
+  const uint64_t loads = runtime.stats().levels_loaded;
+  ASSERT_TRUE(runtime.move_instance(InstanceId{1}, places[2]));
+  ASSERT_TRUE(runtime.move_instance(InstanceId{2}, places[1]));
+  hash(changed);
+  EXPECT_EQ(runtime.stats().levels_loaded, loads);  // nothing was built anew
+}
+
+TEST_F(RuntimeTest, PlansFollowWhatMovesComesAndIsHidden) {
+  Host host;
+  const AssetId asset = host.add(sphere(), {at({0, 0, 0}), at({0, 0, -5000})});
+  const auto finest = [&] { return host.plan(vec3(0, 0, 5)).finest_level[0]; };
+  EXPECT_EQ(finest(), 0u);
+  ASSERT_TRUE(host.runtime().set_visible(InstanceId{0}, false));
+  EXPECT_EQ(finest(), 5u);
+  ASSERT_TRUE(host.runtime().move_instance(InstanceId{1}, at({0, 0, -60})));
+  EXPECT_EQ(finest(), 1u);
+  ASSERT_TRUE(host.runtime().add_instance(asset, at({0, 0, 0})));
+  EXPECT_EQ(finest(), 0u);
+  ASSERT_TRUE(host.runtime().remove_instance(InstanceId{2}));
+  for (int i = 0; i < 3000; ++i) ASSERT_TRUE(host.runtime().move_instance(InstanceId{1}, at({0, 0, -5000})));
+  EXPECT_EQ(finest(), 5u);
+  ASSERT_TRUE(host.runtime().remove_instance(InstanceId{1}));
+  finest();
+  RayContext context;
+  EmbreeRayHit hit;
+  EXPECT_FALSE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));  // all are hidden or removed
 }
 
 // --- What rays see ---------------------------------------------------------------------------------------------------
@@ -528,6 +677,69 @@ TEST_F(RuntimeTest, ALevelThatWasReplacedSinceTheAssetWasOpenedIsNotMixedIn) {
   hash_of_hits(host);
   ASSERT_EQ(host.messages.size(), 1u);
   EXPECT_NE(host.messages[0].find("level_1.ffl"), std::string::npos) << host.messages[0];
+}
+
+/// What can happen to a file while a host has its asset open.
+void damage(const std::filesystem::path& file, uint32_t how) {
+  std::error_code ignored;
+  if (how % 3 == 0) std::filesystem::resize_file(file, 100, ignored);
+  if (how % 3 == 1) std::filesystem::remove(file, ignored);
+  if (how % 3 == 2) {
+    const std::string garbage(std::filesystem::file_size(file, ignored), '\xff');
+    std::fstream(file, std::ios::in | std::ios::out | std::ios::binary) << garbage;
+  }
+}
+
+TEST_F(RuntimeTest, WhatIsLoadedStaysAsItWasWhateverHappensToItsFiles) {
+  const auto asset = copy("changed.farfield");
+  Host host;
+  host.add(asset);
+  host.plan(vec3(0, 0, 25));
+  const uint64_t before = hash_of_hits(host, 0.02f);
+  uint32_t how = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(asset)) damage(entry.path(), how++);
+  EXPECT_EQ(hash_of_hits(host, 0.02f), before);
+  host.plan(vec3(0, 0, 25));
+  EXPECT_EQ(hash_of_hits(host, 0.02f), before);
+  EXPECT_TRUE(host.messages.empty()) << host.messages[0];
+}
+
+TEST_F(RuntimeTest, FilesThatAreDamagedWhileRaysFlyCostLevelsAndNothingElse) {
+  const auto distance_of = [](int frame) { return 3.0f * std::exp2f(static_cast<float>(frame * 5 % 8)); };
+  std::vector<uint64_t> sound_frames;
+  {
+    Host host;
+    host.add(sphere());
+    for (int frame = 0; frame < 8; ++frame) {
+      host.plan(vec3(0, 0, distance_of(frame)));
+      sound_frames.push_back(hash_of_hits(host, 0.005f));
+    }
+  }
+  size_t frames_as_they_should_be = 0, frames_with_messages = 0;
+  for (uint32_t trial = 0; trial < 12; ++trial) {
+    const auto asset = copy("damaged.farfield");
+    Host host;
+    host.add(asset);
+    std::thread vandal([&] {
+      for (const uint32_t level : {0u, 1u, 2u, 3u, 5u}) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(trial));
+        damage(asset / ("level_" + std::to_string(level) + ".ffl"), trial + level);
+      }
+    });
+    for (int frame = 0; frame < 8; ++frame) {
+      host.plan(vec3(0, 0, distance_of(frame)));
+      const uint64_t fallbacks = host.runtime().stats().fallbacks;
+      const bool is_as_it_should_be = hash_of_hits(host, 0.005f) == sound_frames[static_cast<size_t>(frame)];
+      const bool was_said = !host.messages.empty() && host.runtime().stats().fallbacks > fallbacks;
+      EXPECT_TRUE(is_as_it_should_be || was_said) << "trial " << trial << ", frame " << frame;
+      frames_as_they_should_be += is_as_it_should_be;
+      frames_with_messages += was_said;
+    }
+    vandal.join();
+    EXPECT_LE(host.messages.size(), 5u);
+  }
+  EXPECT_GT(frames_as_they_should_be, 0u);
+  EXPECT_GT(frames_with_messages, 0u);
 }
 
 TEST_F(RuntimeTest, ProgressiveRaysUseTheRootFirstAndThePlanInTheEnd) {
@@ -607,6 +819,43 @@ TEST_F(RuntimeTest, InteractionsSayWhereAndHow) {
   // From inside, the normal is on the other side.
   ASSERT_TRUE(host.trace({1, 2, 3}, {0, 0.01f, -1}, context, hit));
   EXPECT_NEAR(host.interaction(hit, context).geometric_normal.z, 1.0f, 0.01f);
+}
+
+TEST_F(RuntimeTest, InteractionsSayWhatTheirLightMeets) {
+  const TemporaryFolder folder;
+  std::vector<LevelData> levels = white_sphere();
+  const SymMat3 flat = SymMat3::outer(vec3(0, 0, 1)) + SymMat3::identity() * 0.01f;
+  levels[4] = test::empty_level(5, levels[4].header.resolution);
+  test::set_volume(
+      levels[4], ivec3(1), vec3(-2.56f), [](int, int, int) { return 50.0f; }, [&](int, int, int) { return flat; });
+  set_diffuse(levels[4], vec3(0.25f, 0.5f, 0.75f));
+  write_asset(folder.path() / "a.farfield", levels);
+  const auto at_lambda = [&](float lambda, const mat4x3& place) {
+    Host host(with_lambda(lambda));
+    host.add(folder.path() / "a.farfield", {place});
+    host.plan();
+    RayContext context;
+    EmbreeRayHit hit;
+    EXPECT_TRUE(host.trace({0.1f, 0.2f, 20}, {0, 0, -1}, context, hit));
+    return host.interaction(hit, context);
+  };
+  const Interaction surface = at_lambda(0, mat4x3(1.0f));
+  ASSERT_EQ(surface.kind, Interaction::Kind::Surface);
+  EXPECT_EQ(surface.reflectance.diffuse, vec3(1.0f));
+  EXPECT_EQ(surface.reflectance.specular, vec3(0.0f));
+  EXPECT_EQ(surface.reflectance.sggx[0], 0.0f);
+
+  const mat4x3 turned(vec3(0, 0, 1), vec3(0, 1, 0), vec3(-1, 0, 0), vec3(0.0f));  // z becomes -x
+  for (const bool is_turned : {false, true}) {
+    const Interaction volume = at_lambda(5, is_turned ? turned : mat4x3(1.0f));
+    ASSERT_EQ(volume.kind, Interaction::Kind::Volume);
+    EXPECT_NEAR(volume.reflectance.diffuse.y, 0.5f, 0.01f);
+    EXPECT_EQ(volume.reflectance.self_shadowing, 1.0f);
+    const float* s = volume.reflectance.sggx;
+    EXPECT_NEAR(s[0] + s[1] + s[2], 1.0f, 1e-4f);
+    EXPECT_GT(s[is_turned ? 0 : 2], 0.9f);
+    EXPECT_LT(s[is_turned ? 2 : 0], 0.1f);
+  }
 }
 
 TEST_F(RuntimeTest, HitsThatAreNotOursOrHaveGoneAreBlackAndSaidOnce) {
