@@ -76,7 +76,7 @@ bool is_in_range(const glm::dmat3& m) { return is_in_range(m[0]) && is_in_range(
 // --- Instances -------------------------------------------------------------------------------------------------------
 
 vec3 InstanceRecord::normal_to_world(const vec3& n) const {
-  return handedness * (n.x * vec3(world_to_local[0]) + n.y * vec3(world_to_local[1]) + n.z * vec3(world_to_local[2]));
+  return static_cast<float>(handedness) * (n.x * vec3(world_to_local[0]) + n.y * vec3(world_to_local[1]) + n.z * vec3(world_to_local[2]));
 }
 
 mat3 InstanceRecord::linear_to_local() const {
@@ -102,7 +102,7 @@ Result<InstanceRecord> make_instance(uint32_t asset, const mat4x3& local_to_worl
         vec4(glm::dvec4(inverse[0][row], inverse[1][row], inverse[2][row], back[row]));
   }
   record.asset = asset;
-  record.handedness = determinant < 0.0 ? -1.0f : 1.0f;
+  record.handedness = determinant < 0.0 ? -1 : 1;
   return record;
 }
 
@@ -154,7 +154,7 @@ bool InstanceGeometry::enter(uint32_t instance, const EmbreeRay& ray, const RayC
   const RayRange range = clip_to_box(visit.ray, asset.bounds);
   if (!(range.t_near * (1.0f - kRangePad) <= range.t_far * (1.0f + kRangePad))) return false;
 
-  visit.choice = choose_level(asset, record.footprint, instance, context, range.t_near, forced_lambda);
+  visit.choice = choose_level(asset, record.footprint, record.limits, instance, context, range.t_near, forced_lambda);
   if (visit.choice.blend > 0.0f) {
     visit.morph = asset.morphs[visit.choice.slot].load(std::memory_order_acquire);
     if (!visit.morph) visit.morph = source_.serve_morph(record.asset, visit.choice.slot);
@@ -227,7 +227,7 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
   }
   made.instance = instance;
   const InstanceRecord& hit_instance = instances[instance];
-  made.lambda = lambda_of_choice(*assets[hit_instance.asset], hit_instance.footprint, visit.choice, forced_lambda);
+  made.lambda = lambda_of_choice(*assets[hit_instance.asset], hit_instance.footprint, hit_instance.limits, visit.choice, forced_lambda);
   vec3 normal_world(0.0f);
   if (made.is_volume) {
     hit.u = hit.v = 0.0f;
@@ -237,7 +237,7 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
     made.normal_local[0] = normal.x, made.normal_local[1] = normal.y, made.normal_local[2] = normal.z;
     normal_world = hit_instance.normal_to_world(normal);
   }
-  made.footprint = context.cone_width + context.cone_spread * ray.tfar;
+  made.footprint = context.width_at(ray.tfar);
   hit.Ng_x = normal_world.x, hit.Ng_y = normal_world.y, hit.Ng_z = normal_world.z;
   hit.geomID = geometry_id;
   hit.primID = instance;

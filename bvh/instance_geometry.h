@@ -20,7 +20,8 @@ struct alignas(64) InstanceRecord {
   std::array<vec4, 3> world_to_local;  ///< rows
   InstanceFootprint footprint;
   uint32_t asset = 0;
-  float handedness = 1;  ///< sign of the transform's determinant
+  int8_t handedness = 1;  ///< sign of the transform's determinant
+  LevelLimits limits;
 
   vec3 point_to_local(const vec3& p) const {
     const auto row = [&](const vec4& r) { return r.x * p.x + r.y * p.y + r.z * p.z + r.w; };

@@ -59,22 +59,24 @@ uint32_t dissolve(const SlotBlend& slots, uint32_t instance, const RayContext& r
   return to_unit_float(mix64(ray.path_seed, instance)) < slots.blend ? slots.coarser : slots.slot;
 }
 
-LevelChoice choose_level(const TracedAsset& asset, const InstanceFootprint& footprint, uint32_t instance,
-                         const RayContext& ray, float t_entry, const std::optional<float>& forced_lambda) {
-  const RayCone cone{ray.cone_width, ray.cone_spread};
-  LevelChoice choice{0, 0.0f, std::max(footprint.camera_footprint, cone.diameter(t_entry))};
+LevelChoice choose_level(const TracedAsset& asset, const InstanceFootprint& footprint, const LevelLimits& limits,
+                         uint32_t instance, const RayContext& ray, float t_entry,
+                         const std::optional<float>& forced_lambda) {
+  LevelChoice choice{0, 0.0f, std::max(footprint.camera_footprint, ray.width_at(t_entry))};
   if (ray.origin_instance == instance) {
     choice.slot = usable_near(asset, ray.origin_level_slot);
     if (choice.slot == ray.origin_level_slot && asset.may_morph(choice.slot)) choice.blend = blend_of(ray.origin_blend);
     return choice;
   }
   if (!forced_lambda) {
-    if (const auto slot = only_slot(asset, footprint_in_r0(asset, footprint, choice.footprint))) {
+    const float width = std::clamp(footprint_in_r0(asset, footprint, choice.footprint), width_of_level(limits.finest),
+                                   width_of_level(limits.coarsest));
+    if (const auto slot = only_slot(asset, width)) {
       choice.slot = *slot;
       return choice;
     }
   }
-  const SlotBlend blend = split_slots(asset, lambda_of_choice(asset, footprint, choice, forced_lambda));
+  const SlotBlend blend = split_slots(asset, lambda_of_choice(asset, footprint, limits, choice, forced_lambda));
   if (asset.may_morph(blend.slot)) {
     choice.blend = blend_of(blend.blend);
     choice.slot = blend.blend > 0.5f && choice.blend == 0 ? blend.coarser : blend.slot;
@@ -84,12 +86,17 @@ LevelChoice choose_level(const TracedAsset& asset, const InstanceFootprint& foot
   return choice;
 }
 
-float lambda_of_choice(const TracedAsset& asset, const InstanceFootprint& footprint, const LevelChoice& choice,
-                       const std::optional<float>& forced_lambda) {
+float lambda_of_choice(const TracedAsset& asset, const InstanceFootprint& footprint, const LevelLimits& limits,
+                       const LevelChoice& choice, const std::optional<float>& forced_lambda) {
   const float coarsest = asset.coarsest_number();
-  const float asked = forced_lambda ? std::clamp(*forced_lambda, 0.0f, coarsest)
-                                    : lambda_of_footprint(choice.footprint * footprint.world_to_r0,
-                                                          asset.base_resolution, static_cast<int>(coarsest));
+  float asked;
+  if (forced_lambda) {
+    asked = std::clamp(*forced_lambda, 0.0f, coarsest);
+  } else {
+    asked = lambda_of_footprint(choice.footprint * footprint.world_to_r0, asset.base_resolution,
+                                static_cast<int>(coarsest));
+    asked = std::clamp(asked, std::min<float>(limits.finest, coarsest), std::min<float>(limits.coarsest, coarsest));
+  }
   return std::max(asked, asset.level_numbers[asset.finest_slot()]);
 }
 

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "bvh/traced_asset.h"
+#include "farfield/camera.h"
 #include "farfield/ray.h"
 
 namespace farfield {
@@ -36,16 +37,17 @@ struct LevelChoice {
 /// lambda is that of the wider of the camera's footprint on the instance and the ray's cone where it enters the
 /// instance's bounds (t_entry), no finer than the plan allows. Between two usable levels the path sees their morph
 /// where the plan has it, else dissolve()d. A ray that leaves a hit on this instance keeps that hit's level and blend.
-/// forced_lambda replaces lambda.
-LevelChoice choose_level(const TracedAsset& asset, const InstanceFootprint& footprint, uint32_t instance,
-                         const RayContext& ray, float t_entry, const std::optional<float>& forced_lambda);
+/// limits hold lambda; forced_lambda replaces it.
+LevelChoice choose_level(const TracedAsset& asset, const InstanceFootprint& footprint, const LevelLimits& limits,
+                         uint32_t instance, const RayContext& ray, float t_entry,
+                         const std::optional<float>& forced_lambda);
 
 /// The coarser of two slots for the share `blend` of paths, decided by path_seed and instance alone, so every ray of a
 /// path sees the same one.
 uint32_t dissolve(const SlotBlend& slots, uint32_t instance, const RayContext& ray);
 
 /// The lambda of a choice: what was asked for, after the plan's clamp. For hits alone: most choices need no logarithm.
-float lambda_of_choice(const TracedAsset& asset, const InstanceFootprint& footprint, const LevelChoice& choice,
-                       const std::optional<float>& forced_lambda);
+float lambda_of_choice(const TracedAsset& asset, const InstanceFootprint& footprint, const LevelLimits& limits,
+                       const LevelChoice& choice, const std::optional<float>& forced_lambda);
 
 }  // namespace farfield

@@ -26,7 +26,7 @@ float opacity_at(const TracedLevel& level, const RayContext& context, const Embr
   if (average == 255 || average == 0 || !level.look) return unpack_unorm8(average);
   const vec3 direction(ray.dir_x, ray.dir_y, ray.dir_z);
   // The ray is in local space, but t is the world's: cones are in world units, along a unit direction there.
-  const float width = (context.cone_width + context.cone_spread * ray.tfar) * glm::length(direction);
+  const float width = context.width_at(ray.tfar) * glm::length(direction);
   return level.look->opacity(level.view, {quad, face, barycentric, direction, width});
 }
 

@@ -23,6 +23,20 @@ double distance_to(const Box3& box, const vec3& point) {
   return std::sqrt(squared);
 }
 
+/// Whether no point of a box is in the camera's frustum, as far as single planes tell.
+bool is_off_screen(const TessellationCamera& camera, const Box3& box) {
+  for (int i = 0; i < camera.frustum_planes; ++i) {
+    const glm::vec4& plane = camera.frustum[i];
+    double furthest_inside = plane.w;
+    for (int axis = 0; axis < 3; ++axis) {
+      const float corner = plane[axis] > 0.0f ? box.upper[axis] : box.lower[axis];
+      furthest_inside += static_cast<double>(plane[axis]) * static_cast<double>(corner);
+    }
+    if (furthest_inside < 0) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 float lambda_of_footprint(float footprint, float base_resolution, int coarsest_level) {
@@ -35,7 +49,8 @@ float finest_footprint(std::span<const TessellationCamera> cameras, const Box3& 
   float finest = std::numeric_limits<float>::infinity();
   if (bounds_world.is_empty()) return finest;
   for (const TessellationCamera& camera : cameras) {
-    const double footprint = camera.pixel_width + camera.pixel_spread * distance_to(bounds_world, camera.position);
+    double footprint = camera.pixel_width + camera.pixel_spread * distance_to(bounds_world, camera.position);
+    if (camera.off_screen_scale > 1.0f && is_off_screen(camera, bounds_world)) footprint *= camera.off_screen_scale;
     if (std::isnan(footprint)) return 0.0f;
     finest = std::min(finest, static_cast<float>(footprint));
   }

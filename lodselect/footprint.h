@@ -10,13 +10,6 @@
 
 namespace farfield {
 
-/// What a ray stands for: a cone whose diameter at parameter t is width + spread * t. World units; both >= 0.
-struct RayCone {
-  float width = 0;
-  float spread = 0;
-  float diameter(float t) const { return width + spread * t; }
-};
-
 /// lambda = log2(footprint / base_resolution), clamped to [0, coarsest_level]. Footprint 0 (or NaN) gives 0, infinity
 /// gives the coarsest level. Monotone in the footprint.
 float lambda_of_footprint(float footprint, float base_resolution, int coarsest_level);

@@ -42,8 +42,14 @@ CameraRay Camera::ray(float x_px, float y_px) const {
 }
 
 TessellationCamera Camera::tessellation() const {
-  if (orthographic_) return {position_, pixel_size_, 0.0f};
-  return {position_, 0.0f, pixel_size_};
+  const float width_world = pixel_size_ * static_cast<float>(width_),
+              tan_y = 0.5f * pixel_size_ * static_cast<float>(height_);
+  TessellationCamera camera =
+      orthographic_
+          ? TessellationCamera::orthographic(position_, forward_, up_, width_world, width_, height_)
+          : TessellationCamera::perspective(position_, forward_, up_, 2.0f * std::atan(tan_y), width_, height_);
+  (orthographic_ ? camera.pixel_width : camera.pixel_spread) = pixel_size_;  // without the rounding of a round trip
+  return camera;
 }
 
 }  // namespace farfield

@@ -62,6 +62,7 @@ std::string make_fingerprint(const RenderOptions& options, std::span<const fs::p
   // Said only where they differ: shots from before know no others.
   if (options.turn_sun) text += " sun turned";
   if (options.blend_window != 1.0f) text += fmt::format(" blend window {}", options.blend_window);
+  if (options.off_screen_scale != 1.0f) text += fmt::format(" off screen {}", options.off_screen_scale);
   for (const fs::path& folder : asset_folders)
     if (!folder.empty()) text += fmt::format(" {}:{}", folder.filename().string(), to_hex(manifest_hash(folder)));
   return text;

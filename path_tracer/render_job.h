@@ -29,6 +29,7 @@ struct RenderOptions {
   /// Folder of baked assets: ASSETS/SCENE/MESH.farfield for each mesh. Empty: "farfield-assets" beside the scene.
   std::filesystem::path assets;
   float pixel_error = 1.0f;  ///< RuntimeOptions::pixel_error
+  float off_screen_scale = 1.0f;  ///< TessellationCamera::off_screen_scale
   Blend blend = Blend::Dissolve;
   float blend_window = 1.0f;          ///< RuntimeOptions::blend_window
   bool full_detail = false;           ///< level 0 only, from assets baked with --source-only

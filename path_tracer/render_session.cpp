@@ -108,7 +108,9 @@ Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& li
   const auto start = std::chrono::steady_clock::now();
   const double cpu_start = process_cpu_seconds();
   const Stats before = runtime_->stats();
-  runtime_->set_cameras({camera.tessellation()});
+  TessellationCamera tessellation = camera.tessellation();
+  tessellation.off_screen_scale = options.off_screen_scale;
+  runtime_->set_cameras({tessellation});
   FARFIELD_TRY_LET(auto plan, runtime_->plan_frame());
   runtime_->prefetch();
   malloc_trim(0);  // what writing the last frame left in the heap is not the assets'

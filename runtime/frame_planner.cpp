@@ -15,12 +15,6 @@ namespace {
 // A camera footprint's share of an image: no instance counts for more pixels than a frame has.
 constexpr double kLargestPixelCount = 1e7;
 
-bool are_same(const std::vector<TessellationCamera>& a, const std::vector<TessellationCamera>& b) {
-  return std::ranges::equal(a, b, [](const TessellationCamera& x, const TessellationCamera& y) {
-    return x.position == y.position && x.pixel_width == y.pixel_width && x.pixel_spread == y.pixel_spread;
-  });
-}
-
 }  // namespace
 
 void FramePlanner::note_moved(uint32_t instance) {
@@ -41,7 +35,7 @@ void FramePlanner::update_footprint(uint32_t i, const std::vector<TessellationCa
 
 void FramePlanner::update_footprints(const std::vector<TessellationCamera>& of_cameras) {
   constexpr size_t kGrain = 1024;
-  const size_t first = are_same(of_cameras, footprint_cameras_) ? up_to_date_ : 0;
+  const size_t first = of_cameras == footprint_cameras_ ? up_to_date_ : 0;
   const size_t count = geometry_.instances.size() - first;
   parallel_for(count, kGrain, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) update_footprint(static_cast<uint32_t>(first + i), of_cameras);
@@ -56,8 +50,10 @@ void FramePlanner::update_footprints(const std::vector<TessellationCamera>& of_c
 float FramePlanner::wanted_lambda(const InstanceRecord& instance) const {
   if (options_.forced_lambda) return std::max(0.0f, *options_.forced_lambda);
   const InstanceFootprint& footprint = instance.footprint;
-  return lambda_of_footprint(footprint.camera_footprint * footprint.world_to_r0,
-                             geometry_.assets[instance.asset]->base_resolution, std::numeric_limits<int>::max());
+  const float lambda =
+      lambda_of_footprint(footprint.camera_footprint * footprint.world_to_r0,
+                          geometry_.assets[instance.asset]->base_resolution, std::numeric_limits<int>::max());
+  return std::clamp<float>(lambda, instance.limits.finest, instance.limits.coarsest);
 }
 
 std::vector<PlanAsset> FramePlanner::wanted_assets(const LevelStore& levels) const {

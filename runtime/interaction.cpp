@@ -338,4 +338,25 @@ float Interaction::next_cone_spread(const ScatterSample& sample, float cone_spre
   return cone_spread + std::min(kConeShare * lobe, kWidestCone);
 }
 
+RayDifferential Interaction::next_differential(const ScatterSample& sample, const RayDifferential& incoming,
+                                               float t) const {
+  RayDifferential arrived =
+      kind == Kind::Surface ? transferred(incoming, -wo, t, geometric_normal) : transferred(incoming, t);
+  if (kind == Kind::Surface && glm::dot(sample.wi, geometric_normal) > 0.0f) {
+    const vec3 half = sample.wi + wo;
+    const float length = glm::length(half);
+    if (length > 0.0f) arrived = reflected(arrived, -wo, half / length);
+  }
+  return widened(arrived, sample.wi, next_cone_spread(sample, 0.0f));
+}
+
+void Interaction::spawn(const ScatterSample& sample, float t, RayContext& context) const {
+  if (context.has_differential) {
+    context.set_differential(next_differential(sample, context.differential, t), sample.wi, context.footprint_axis);
+  }
+  context.cone_width += context.cone_spread * t;
+  context.cone_spread = next_cone_spread(sample, context.cone_spread);
+  context.set_origin(context.hit);
+}
+
 }  // namespace farfield

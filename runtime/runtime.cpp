@@ -44,6 +44,16 @@ tl::unexpected<Error> no_such_instance(InstanceId instance) {
   return make_error(ErrorCode::InvalidArgument, fmt::format("there is no instance {}", instance.value));
 }
 
+tl::unexpected<Error> no_such_asset(AssetId asset) {
+  return make_error(ErrorCode::InvalidArgument, fmt::format("there is no asset {}", asset.value));
+}
+
+Result<void> check_limits(const LevelLimits& limits) {
+  if (limits.finest <= limits.coarsest) return {};
+  return make_error(ErrorCode::InvalidArgument, fmt::format("no level is between {} and {}: the finest comes first",
+                                                            limits.finest, limits.coarsest));
+}
+
 Result<std::filesystem::path> canonical_folder(const std::string& folder) {
   std::error_code error;
   std::filesystem::path canonical = std::filesystem::canonical(folder, error);
@@ -82,6 +92,7 @@ struct Runtime::Impl {
   InstanceGeometry geometry{levels};
   FramePlanner planner;
   HostScene host;
+  std::vector<LevelLimits> asset_limits;    ///< per asset, up to the last that has any
   std::vector<InstanceData> instance_data;  ///< per instance, up to the last one that has any
   std::set<uint32_t> free_ids;              ///< of instances that were removed: the lowest is the next one's
   std::atomic<bool> said_stale_hit{false};
@@ -156,13 +167,14 @@ void Runtime::bounds(AssetId asset, glm::vec3& lower, glm::vec3& upper) const {
 Result<InstanceRecord> Runtime::Impl::make_record(uint32_t asset, const mat4x3& local_to_world) const {
   FARFIELD_TRY_LET(auto record, make_instance(asset, with_origin(local_to_world, levels.asset(asset).origin)));
   record.footprint.world_to_r0 = options.pixel_error / largest_stretch(local_to_world);
+  if (asset < asset_limits.size()) record.limits = asset_limits[asset];
   return record;
 }
 
 Result<InstanceId> Runtime::add_instance(AssetId asset, const glm::mat4x3& local_to_world, const InstanceData& data) {
   Impl& impl = *impl_;
   if (asset.value >= impl.levels.asset_count()) {
-    return make_error(ErrorCode::InvalidArgument, fmt::format("there is no asset {}", asset.value));
+    return no_such_asset(asset);
   }
   FARFIELD_TRY_LET(auto record, impl.make_record(asset.value, local_to_world));
   std::vector<InstanceRecord>& instances = impl.geometry.instances;
@@ -187,11 +199,32 @@ Result<InstanceId> Runtime::add_instance(AssetId asset, const glm::mat4x3& local
   return added;
 }
 
+Result<void> Runtime::set_level_limits(InstanceId instance, const LevelLimits& limits) {
+  FARFIELD_TRY(check_limits(limits));
+  if (!impl_->has_instance(instance)) return no_such_instance(instance);
+  impl_->geometry.instances[instance.value].limits = limits;
+  return {};
+}
+
+Result<void> Runtime::set_level_limits(AssetId asset, const LevelLimits& limits) {
+  FARFIELD_TRY(check_limits(limits));
+  Impl& impl = *impl_;
+  if (asset.value >= impl.levels.asset_count()) return no_such_asset(asset);
+  impl.asset_limits.resize(impl.levels.asset_count());
+  impl.asset_limits[asset.value] = limits;
+  for (InstanceRecord& instance : impl.geometry.instances) {
+    if (instance.asset == asset.value) instance.limits = limits;
+  }
+  return {};
+}
+
 Result<void> Runtime::move_instance(InstanceId instance, const glm::mat4x3& local_to_world) {
   Impl& impl = *impl_;
   if (!impl.has_instance(instance)) return no_such_instance(instance);
   InstanceRecord& record = impl.geometry.instances[instance.value];
+  const LevelLimits limits = record.limits;
   FARFIELD_TRY_LET(record, impl.make_record(record.asset, local_to_world));
+  record.limits = limits;
   impl.planner.note_moved(instance.value);
   return {};
 }

@@ -17,7 +17,8 @@ import sys
 import numpy
 import OpenImageIO as oiio
 
-FARFIELD = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "build", "release", "bin", "farfield")
+FARFIELD = os.environ.get("FARFIELD") or os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "build", "release",
+                                                      "bin", "farfield")
 SETTINGS = {
     "full detail": ["--full-detail"],
     "at once": ["--blend-window", "0.001"],

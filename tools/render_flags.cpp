@@ -81,6 +81,11 @@ void add_level_flags(CLI::App* command, RenderOptions& options) {
   add_parsed_option(command, "--pixel-error", options.pixel_error, parse_pixel_error,
                     "How wide voxels may look, in pixels: above 1 coarser, below 1 finer")
       ->default_str("1");
+  command
+      ->add_option("--off-screen-scale", options.off_screen_scale,
+                   "How much wider voxels of what the camera does not see may look in mirrors and in bounced light")
+      ->check(CLI::Range(1.0, 1e6))
+      ->default_str("1");
   command->add_flag("--full-detail", options.full_detail, "Render the sources, without levels, for comparison");
   command
       ->add_flag("--turn-sun", options.turn_sun,

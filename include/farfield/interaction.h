@@ -81,6 +81,13 @@ class FARFIELD_API Interaction {
   /// eighth of the lobe's, 2 sqrt(1 / (pi pdf)), at most 1. About 0.25 after a diffuse event, 0.5 in isotropic volumes,
   /// nothing at mirrors.
   float next_cone_spread(const ScatterSample& sample, float cone_spread) const;
+  /// The differential of the next ray: carried to the hit, t along the ray that came (unit direction), mirrored about
+  /// the half vector or, through a surface or a flake, going straight on, and widened as cones are.
+  RayDifferential next_differential(const ScatterSample& sample, const RayDifferential& incoming, float t) const;
+  /// Makes the context that of the ray from ray_origin(sample.wi) towards sample.wi: where it starts, the level that it
+  /// keeps there, its cone or differential. context: as rtcIntersect1 left it, t: tfar of that ray. The host still
+  /// gives it a new ray_seed.
+  void spawn(const ScatterSample& sample, float t, RayContext& context) const;
 
  private:
   friend struct detail::InteractionModel;

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "farfield/embree.h"
+#include "farfield/ray_differential.h"
 
 namespace farfield {
 
@@ -50,6 +51,11 @@ struct RayContext {
   // In: the cone of the ray [Amanatides 1984]. Its diameter at ray parameter t is cone_width + cone_spread * t.
   float cone_width = 0;   ///< world units at the ray's origin, >= 0
   float cone_spread = 0;  ///< world units per unit of t, >= 0
+  // In, in place of the cone: see set_differential().
+  bool has_differential = false;
+  FootprintAxis footprint_axis = FootprintAxis::Longer;
+  RayDifferential differential;
+  FootprintGrowth footprint_growth;
   // In: randomness. Same values give the same answer.
   uint32_t path_seed = 0;  ///< constant along a path: decides which of two blended levels the path sees
   uint32_t ray_seed = 0;   ///< different for every ray: free flights in volumes
@@ -67,6 +73,19 @@ struct RayContext {
   }
   /// For packets and streams: Embree's RTC_INTERSECT_CONTEXT_FLAG_COHERENT, or _INCOHERENT, the default.
   void set_coherent(bool is_coherent) { detail::mark(embree, detail::kRayContextMark, is_coherent); }
+  /// Gives the ray a differential in place of its cone; the axis is what asks for levels. The ray's direction is a unit
+  /// vector then.
+  void set_differential(const RayDifferential& of_ray, const glm::vec3& unit_direction,
+                        FootprintAxis axis = FootprintAxis::Longer) {
+    has_differential = true;
+    footprint_axis = axis;
+    differential = of_ray;
+    footprint_growth = FootprintGrowth(of_ray, unit_direction);
+  }
+  /// How wide what the ray stands for is at parameter t; world units.
+  float width_at(float t) const {
+    return has_differential ? width_of(footprint_growth.at(t), footprint_axis) : cone_width + cone_spread * t;
+  }
   /// Says that the ray starts at `from`, a hit on Farfield geometry.
   void set_origin(const HitRecord& from) {
     origin_instance = from.instance;

@@ -59,19 +59,43 @@ inline RayDifferential thin_lens_differential(const glm::vec3& to_focus, const g
 
 // --- Along a ray -----------------------------------------------------------------------------------------------------
 
+/// How a footprint grows along a ray with a unit direction: what the axes at any distance follow from.
+class FootprintGrowth {
+ public:
+  FootprintGrowth() = default;
+  FootprintGrowth(const RayDifferential& ray, const glm::vec3& direction) {
+    const glm::dvec3 d = glm::normalize(glm::dvec3(direction));  // to more than float: a circle stays one
+    const auto across = [&](const glm::vec3& v) { return glm::dvec3(v) - glm::dot(glm::dvec3(v), d) * d; };
+    const glm::dvec3 u0 = across(ray.origin_dx), v0 = across(ray.origin_dy);
+    const glm::dvec3 u1 = across(ray.direction_dx), v1 = across(ray.direction_dy);
+    squares_[0] = glm::dot(u0, u0) + glm::dot(v0, v0);
+    squares_[1] = 2 * (glm::dot(u0, u1) + glm::dot(v0, v1));
+    squares_[2] = glm::dot(u1, u1) + glm::dot(v1, v1);
+    area_[0] = glm::dot(glm::cross(u0, v0), d);
+    area_[1] = glm::dot(glm::cross(u0, v1) + glm::cross(u1, v0), d);
+    area_[2] = glm::dot(glm::cross(u1, v1), d);
+  }
+
+  /// Across the ray at a distance of t: singular values of the matrix that takes pixels there, from the sum of their
+  /// squares and from their product.
+  FootprintAxes at(float t) const {
+    const auto value = [t](const double* c) { return c[0] + t * (c[1] + t * c[2]); };
+    const double sum = value(squares_), product = std::abs(value(area_));
+    const double longer = std::sqrt((sum + std::sqrt(std::max(sum * sum - 4 * product * product, 0.0))) / 2);
+    FootprintAxes axes;
+    axes.longer = static_cast<float>(longer);
+    axes.shorter = longer > 0 ? static_cast<float>(std::min(product / longer, longer)) : axes.longer;
+    return axes;
+  }
+
+ private:
+  double squares_[3] = {};  ///< coefficients of 1, t, t^2
+  double area_[3] = {};
+};
+
 /// The footprint at a distance of t along a unit direction, across it.
 inline FootprintAxes footprint_axes(const RayDifferential& ray, const glm::vec3& direction, float t) {
-  const auto across = [&](const glm::vec3& v) { return glm::dvec3(v - glm::dot(v, direction) * direction); };
-  const glm::dvec3 u = across(ray.origin_dx + t * ray.direction_dx), v = across(ray.origin_dy + t * ray.direction_dy);
-  // Singular values of the matrix with columns u and v.
-  const double uu = glm::dot(u, u), uv = glm::dot(u, v), vv = glm::dot(v, v);
-  const double middle = (uu + vv) / 2, spread = std::hypot((uu - vv) / 2, uv);
-  const double longer = std::sqrt(middle + spread);
-  const double area = glm::length(glm::cross(u, v));  // the product of both: exact where their squares cancel
-  FootprintAxes axes;
-  axes.longer = static_cast<float>(longer);
-  axes.shorter = longer > 0 ? static_cast<float>(std::min(area / longer, longer)) : axes.longer;
-  return axes;
+  return FootprintGrowth(ray, direction).at(t);
 }
 inline float width_of(const FootprintAxes& axes, FootprintAxis axis) {
   return axis == FootprintAxis::Shorter ? axes.shorter : axes.longer;

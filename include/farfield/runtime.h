@@ -167,6 +167,12 @@ class FARFIELD_API Runtime {
   /// Removes an instance; likewise. The next add_instance() takes its place, and with it its id and its bytes. Errors:
   /// InvalidArgument (no such instance).
   Result<void> remove_instance(InstanceId instance);
+  /// Holds the levels of an instance within limits, from the next plan_frame() on. Errors: InvalidArgument (no such
+  /// instance, finest > coarsest).
+  Result<void> set_level_limits(InstanceId instance, const LevelLimits& limits);
+  /// The same of all instances of an asset, those that will be added too; the last call counts. Errors:
+  /// InvalidArgument (no such asset, finest > coarsest).
+  Result<void> set_level_limits(AssetId asset, const LevelLimits& limits);
   /// What add_instance() was given for the instance that was hit; the default for what is no hit of ours. Safe from any
   /// thread, as interaction() is.
   InstanceData instance_data(const Interaction& interaction) const;

@@ -111,14 +111,12 @@ vec3 trace_path(RTCScene scene, const farfield::Runtime& runtime, vec3 origin, v
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
       return radiance + throughput * glm::mix(vec3(0.9f), vec3(0.3f, 0.5f, 0.9f), std::max(direction.y, 0.0f));
     }
-    context.cone_width += context.cone_spread * ray.ray.tfar;
     const farfield::Interaction interaction = runtime.interaction(ray, context);
     radiance += throughput * interaction.emission;
     const farfield::ScatterSample sample = interaction.sample(rng);
     throughput *= sample.weight;
     if (throughput == vec3(0.0f)) break;
-    context.cone_spread = interaction.next_cone_spread(sample, context.cone_spread);
-    context.set_origin(context.hit);
+    interaction.spawn(sample, ray.ray.tfar, context);
     origin = interaction.ray_origin(sample.wi);
     direction = sample.wi;
   }

@@ -153,19 +153,18 @@ vec3 light_along_path(const Forest& forest, const host::Camera& camera, int x, i
     context.ray_seed = rng.next_uint();
     rtcIntersect1(forest.scene, &context.embree, &ray);
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return light + throughput;
-    context.cone_width += context.cone_spread * ray.ray.tfar;
     if (ray.hit.geomID == forest.runtime->geometry_id()) {
       const farfield::Interaction interaction = forest.runtime->interaction(ray, context);
       light += throughput * interaction.emission;
       const farfield::ScatterSample sample = interaction.sample(rng);
       throughput *= sample.weight;
-      context.cone_spread = interaction.next_cone_spread(sample, context.cone_spread);
-      context.set_origin(context.hit);
+      interaction.spawn(sample, ray.ray.tfar, context);
       origin = interaction.ray_origin(sample.wi);
       direction = sample.wi;
     } else {  // the ground: Lambert's law
       context.origin_instance = farfield::kNoInstance;
       throughput *= host::kGroundAlbedo;
+      context.cone_width += context.cone_spread * ray.ray.tfar;
       context.cone_spread += 0.25f;
       origin = host::above_ground(ray);
       direction = host::cosine_direction_up(rng);

@@ -39,18 +39,17 @@ vec3 trace_path(RTCScene scene, const farfield::Runtime& runtime, vec3 origin, v
     rtcIntersect1(scene, &context.embree, &ray);
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return radiance + throughput * sky(direction);
 
-    context.cone_width += context.cone_spread * ray.ray.tfar;
     if (ray.hit.geomID == runtime.geometry_id()) {  // (5) a hit on Farfield geometry
       const farfield::Interaction interaction = runtime.interaction(ray, context);
       radiance += throughput * interaction.emission;
       const farfield::ScatterSample sample = interaction.sample(rng);
       throughput *= sample.weight;
-      context.cone_spread = interaction.next_cone_spread(sample, context.cone_spread);
-      context.set_origin(context.hit);
+      interaction.spawn(sample, ray.ray.tfar, context);
       origin = interaction.ray_origin(sample.wi);
       direction = sample.wi;
     } else {  // the host's own
       throughput *= host::kGroundAlbedo;
+      context.cone_width += context.cone_spread * ray.ray.tfar;
       context.cone_spread += 0.25f;
       context.origin_instance = farfield::kNoInstance;
       origin = host::above_ground(ray);

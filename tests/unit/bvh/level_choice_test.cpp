@@ -26,7 +26,7 @@ RayContext path(uint32_t seed) {
 
 float chosen_lambda(const TracedAsset& asset, const InstanceFootprint& footprint, const RayContext& ray,
                     float t_entry) {
-  return lambda_of_choice(asset, footprint, choose_level(asset, footprint, 1, ray, t_entry, {}), {});
+  return lambda_of_choice(asset, footprint, {}, choose_level(asset, footprint, {}, 1, ray, t_entry, {}), {});
 }
 
 /// How often paths see each slot at a lambda.
@@ -34,7 +34,7 @@ std::vector<double> shares(const TracedAsset& asset, float lambda, uint32_t inst
   std::vector<double> counts(asset.slot_count(), 0.0);
   constexpr uint32_t kPaths = 20000;
   for (uint32_t seed = 0; seed < kPaths; ++seed) {
-    counts[choose_level(asset, {}, instance, path(seed), 0.0f, lambda).slot] += 1.0 / kPaths;
+    counts[choose_level(asset, {}, {}, instance, path(seed), 0.0f, lambda).slot] += 1.0 / kPaths;
   }
   return counts;
 }
@@ -74,7 +74,7 @@ TEST(LevelChoice, LevelsThatThePlanLeavesOutAreAsIfNotStored) {
   hit.instance = 7;
   hit.level_slot = 3;  // of an earlier plan
   ray.set_origin(hit);
-  EXPECT_EQ(choose_level(asset, {}, 7, ray, 0.0f, 1.0f).slot, 5u);
+  EXPECT_EQ(choose_level(asset, {}, {}, 7, ray, 0.0f, 1.0f).slot, 5u);
 }
 
 TEST(LevelChoice, TheSamePathNeverGoesBackToAFinerLevelAsLambdaGrows) {
@@ -82,7 +82,7 @@ TEST(LevelChoice, TheSamePathNeverGoesBackToAFinerLevelAsLambdaGrows) {
   for (uint32_t seed = 0; seed < 200; ++seed) {
     uint32_t last = 0;
     for (float lambda = 0.0f; lambda <= 6.0f; lambda += 0.01f) {
-      const uint32_t slot = choose_level(asset, {}, 3, path(seed), 0.0f, lambda).slot;
+      const uint32_t slot = choose_level(asset, {}, {}, 3, path(seed), 0.0f, lambda).slot;
       EXPECT_GE(slot, last);
       EXPECT_LE(slot, last + 1);
       last = slot;
@@ -94,8 +94,8 @@ TEST(LevelChoice, JustBelowAndJustAboveAnIntegerAlmostAllPathsSeeTheSame) {
   const TracedAsset asset = asset_with({0, 1, 2, 3});
   int different = 0;
   for (uint32_t seed = 0; seed < 20000; ++seed) {
-    different += choose_level(asset, {}, 1, path(seed), 0.0f, 2.0f - 1e-4f).slot !=
-                 choose_level(asset, {}, 1, path(seed), 0.0f, 2.0f + 1e-4f).slot;
+    different += choose_level(asset, {}, {}, 1, path(seed), 0.0f, 2.0f - 1e-4f).slot !=
+                 choose_level(asset, {}, {}, 1, path(seed), 0.0f, 2.0f + 1e-4f).slot;
   }
   EXPECT_LE(different, 20);  // expected 4
 }
@@ -108,8 +108,8 @@ TEST(LevelChoice, PathAndInstanceDecideAndNothingElse) {
   b.hit.level_slot = 1;
   int between_instances = 0;
   for (uint32_t instance = 0; instance < 1000; ++instance) {
-    const uint32_t slot = choose_level(asset, {}, instance, a, 0.0f, 0.5f).slot;
-    EXPECT_EQ(slot, choose_level(asset, {}, instance, b, 3.0f, 0.5f).slot);
+    const uint32_t slot = choose_level(asset, {}, {}, instance, a, 0.0f, 0.5f).slot;
+    EXPECT_EQ(slot, choose_level(asset, {}, {}, instance, b, 3.0f, 0.5f).slot);
     between_instances += static_cast<int>(slot);
   }
   EXPECT_NEAR(between_instances, 500, 80);  // 5 sigma: instances are independent
@@ -119,9 +119,9 @@ TEST(LevelChoice, ThePlanClampsLambda) {
   TracedAsset asset = asset_with({0, 1, 2, 3});
   asset.usable_slots = {2, 3};
   for (const float lambda : {0.0f, 0.7f, 1.99f, 2.0f}) {
-    const LevelChoice choice = choose_level(asset, {}, 1, path(1), 0.0f, lambda);
+    const LevelChoice choice = choose_level(asset, {}, {}, 1, path(1), 0.0f, lambda);
     EXPECT_EQ(choice.slot, 2u);
-    EXPECT_EQ(lambda_of_choice(asset, {}, choice, lambda), 2.0f);
+    EXPECT_EQ(lambda_of_choice(asset, {}, {}, choice, lambda), 2.0f);
   }
 }
 
@@ -150,8 +150,8 @@ TEST(LevelChoice, FootprintsAndLambdasChooseTheSame) {
       const float lambda = std::clamp(static_cast<float>(i) / 20, 0.0f, 8.0f);
       int different = 0;
       for (uint32_t seed = 0; seed < 100; ++seed) {
-        different += choose_level(asset, {footprint, 1.0f}, 3, path(seed), 0.0f, {}).slot !=
-                     choose_level(asset, {footprint, 1.0f}, 3, path(seed), 0.0f, lambda).slot;
+        different += choose_level(asset, {footprint, 1.0f}, {}, 3, path(seed), 0.0f, {}).slot !=
+                     choose_level(asset, {footprint, 1.0f}, {}, 3, path(seed), 0.0f, lambda).slot;
       }
       EXPECT_LE(different, 1) << lambda;  // exp2 rounds
     }
@@ -167,26 +167,26 @@ TEST(LevelChoice, RaysThatLeaveAHitKeepItsLevelOnThatInstanceOnly) {
   RayContext ray = path(1);
   ray.cone_width = 1e6f;
   ray.set_origin(hit);
-  EXPECT_EQ(choose_level(asset, {0.0f, 1.0f}, 4, ray, 1.0f, std::nullopt).slot, 1u);
-  EXPECT_EQ(choose_level(asset, {0.0f, 1.0f}, 5, ray, 1.0f, std::nullopt).slot, 3u);
+  EXPECT_EQ(choose_level(asset, {0.0f, 1.0f}, {}, 4, ray, 1.0f, std::nullopt).slot, 1u);
+  EXPECT_EQ(choose_level(asset, {0.0f, 1.0f}, {}, 5, ray, 1.0f, std::nullopt).slot, 3u);
   ray.origin_level_slot = 200;  // a stale record is clamped, not trusted
-  EXPECT_EQ(choose_level(asset, {0.0f, 1.0f}, 4, ray, 1.0f, std::nullopt).slot, 3u);
+  EXPECT_EQ(choose_level(asset, {0.0f, 1.0f}, {}, 4, ray, 1.0f, std::nullopt).slot, 3u);
   ray.origin_level_slot = 0;
-  EXPECT_EQ(choose_level(asset, {0.0f, 1.0f}, 4, ray, 1.0f, std::nullopt).slot, 1u);
+  EXPECT_EQ(choose_level(asset, {0.0f, 1.0f}, {}, 4, ray, 1.0f, std::nullopt).slot, 1u);
 }
 
 TEST(LevelChoice, ExtremeFootprintsGiveTheEnds) {
   const TracedAsset asset = asset_with({0, 1, 2, 3});
   const float inf = std::numeric_limits<float>::infinity();
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_EQ(choose_level(asset, {0.0f, 1.0f}, 1, path(1), 0.0f, std::nullopt).slot, 0u);
-  EXPECT_EQ(choose_level(asset, {inf, 1.0f}, 1, path(1), 0.0f, std::nullopt).slot, 3u);
-  EXPECT_LE(choose_level(asset, {nan, 1.0f}, 1, path(1), 0.0f, std::nullopt).slot, 3u);
+  EXPECT_EQ(choose_level(asset, {0.0f, 1.0f}, {}, 1, path(1), 0.0f, std::nullopt).slot, 0u);
+  EXPECT_EQ(choose_level(asset, {inf, 1.0f}, {}, 1, path(1), 0.0f, std::nullopt).slot, 3u);
+  EXPECT_LE(choose_level(asset, {nan, 1.0f}, {}, 1, path(1), 0.0f, std::nullopt).slot, 3u);
   RayContext ray = path(1);
   ray.cone_spread = inf;
-  EXPECT_LE(choose_level(asset, {1.0f, 1.0f}, 1, ray, 0.0f, std::nullopt).slot, 3u);
+  EXPECT_LE(choose_level(asset, {1.0f, 1.0f}, {}, 1, ray, 0.0f, std::nullopt).slot, 3u);
   const TracedAsset root_only = asset_with({6});
-  EXPECT_EQ(choose_level(root_only, {0.0f, 1.0f}, 1, path(1), 0.0f, std::nullopt).slot, 0u);
+  EXPECT_EQ(choose_level(root_only, {0.0f, 1.0f}, {}, 1, path(1), 0.0f, std::nullopt).slot, 0u);
 }
 
 }  // namespace

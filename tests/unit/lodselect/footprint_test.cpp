@@ -147,5 +147,38 @@ TEST(FinestFootprint, SurvivesHugeDistances) {
   EXPECT_EQ(finest_footprint(std::span(&far, 1), Box3{vec3(-1.0f), vec3(1.0f)}), kInf);
 }
 
+TEST(TessellationCamera, AsksForLessOfWhatItDoesNotSee) {
+  auto perspective = TessellationCamera::perspective({0, 0, 0}, {0, 0, -1}, {0, 1, 0}, 1.5707963f, 200, 100);
+  auto orthographic = TessellationCamera::orthographic({0, 0, 0}, {0, 0, -2}, {0, 1, 0}, 4.0f, 200, 100);
+  EXPECT_FLOAT_EQ(perspective.pixel_spread, 0.02f);
+  EXPECT_FLOAT_EQ(orthographic.pixel_width, 0.02f);
+  for (TessellationCamera* camera : {&perspective, &orthographic}) camera->off_screen_scale = 4.0f;
+  const auto scale = [](const TessellationCamera& camera, const vec3& center) {
+    const Box3 box{center - 0.25f, center + 0.25f};
+    TessellationCamera plain = camera;
+    plain.off_screen_scale = 1.0f;
+    return finest_footprint(std::span(&camera, 1), box) / finest_footprint(std::span(&plain, 1), box);
+  };
+  // At a distance of 10 the perspective one sees from -20 to 20 and from -10 to 10, the other one from -2 to 2 and from
+  // -1 to 1.
+  EXPECT_FLOAT_EQ(scale(perspective, {0, 0, -10}), 1.0f);
+  EXPECT_FLOAT_EQ(scale(perspective, {19.5f, 0, -10}), 1.0f);
+  EXPECT_FLOAT_EQ(scale(perspective, {21, 0, -10}), 4.0f);
+  EXPECT_FLOAT_EQ(scale(perspective, {-21, 0, -10}), 4.0f);
+  EXPECT_FLOAT_EQ(scale(perspective, {0, 11, -10}), 4.0f);
+  EXPECT_FLOAT_EQ(scale(perspective, {0, -11, -10}), 4.0f);
+  EXPECT_FLOAT_EQ(scale(perspective, {0, 0, 10}), 4.0f);
+  EXPECT_FLOAT_EQ(scale(perspective, {20.1f, 0, -10}), 1.0f);  // its border is inside
+  EXPECT_FLOAT_EQ(scale(orthographic, {1.5f, 0, -10}), 1.0f);
+  EXPECT_FLOAT_EQ(scale(orthographic, {2.5f, 0, -10}), 4.0f);
+  EXPECT_FLOAT_EQ(scale(orthographic, {0, -1.5f, -10}), 4.0f);
+  EXPECT_FLOAT_EQ(scale(orthographic, {0, 0, 1}), 4.0f);
+}
+
+TEST(TessellationCamera, WithoutAFrustumSeesAllAround) {
+  const TessellationCamera camera{vec3(0.0f), 0.0f, 0.01f, 8.0f};
+  EXPECT_FLOAT_EQ(finest_footprint(std::span(&camera, 1), Box3{vec3(9, 0, 0), vec3(10, 0, 0)}), 0.09f);
+}
+
 }  // namespace
 }  // namespace farfield

@@ -87,9 +87,7 @@ void render(const Host& host, float distance) {
         const Interaction interaction = host.interaction(hit, context);
         const ScatterSample sample = interaction.sample(rng);
         if (sample.pdf <= 0.0f) break;
-        context.cone_width += context.cone_spread * hit.ray.tfar;
-        context.cone_spread = interaction.next_cone_spread(sample, context.cone_spread);
-        context.set_origin(context.hit);
+        interaction.spawn(sample, hit.ray.tfar, context);
         origin = interaction.ray_origin(sample.wi);
         direction = sample.wi;
       }

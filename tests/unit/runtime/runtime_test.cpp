@@ -998,6 +998,116 @@ TEST_F(RuntimeTest, RaysThatLeaveASurfaceDoNotMeetItAgain) {
   }
 }
 
+// --- Limits ----------------------------------------------------------------------------------------------------------
+
+TEST_F(RuntimeTest, LimitsHoldTheLevelsOfInstancesAndAssets) {
+  Host host;
+  mat4x3 beside(1.0f);
+  beside[3] = vec3(5, 0, 0);
+  const AssetId asset = host.add(sphere(), {mat4x3(1.0f), beside});
+  const auto lambda = [&](float x) {
+    RayContext context;
+    EmbreeRayHit hit;
+    EXPECT_TRUE(host.trace({x, 0, 10}, {0, 0, -1}, context, hit));
+    return context.hit.lambda;
+  };
+  host.plan(vec3(0, 0, 2));  // close: level 0
+  EXPECT_EQ(host.runtime().plan_frame()->finest_level[0], 0u);
+  EXPECT_EQ(lambda(0.1f), 0.0f);
+
+  ASSERT_TRUE(host.runtime().set_level_limits(asset, {2, 3}));
+  EXPECT_EQ(host.plan(vec3(0, 0, 2)).finest_level[0], 2u);
+  EXPECT_EQ(lambda(0.1f), 2.0f);
+  EXPECT_EQ(host.plan(vec3(0, 0, 1e6f)).finest_level[0], 3u);  // far: not the root
+  EXPECT_EQ(lambda(0.1f), 3.0f);
+
+  ASSERT_TRUE(host.runtime().set_level_limits(InstanceId{1}, {0, 0}));  // pinned
+  EXPECT_EQ(host.plan(vec3(0, 0, 1e6f)).finest_level[0], 0u);
+  EXPECT_EQ(lambda(5.1f), 0.0f);
+  EXPECT_EQ(lambda(0.1f), 3.0f);
+
+  ASSERT_TRUE(host.runtime().move_instance(InstanceId{1}, beside));
+  const auto another = host.runtime().add_instance(asset, beside);
+  ASSERT_TRUE(another);
+  EXPECT_EQ(host.plan(vec3(0, 0, 1e6f)).finest_level[0], 0u);  // a move keeps limits
+
+  EXPECT_FALSE(host.runtime().set_level_limits(asset, {3, 2}));
+  EXPECT_FALSE(host.runtime().set_level_limits(AssetId{7}, {}));
+  EXPECT_FALSE(host.runtime().set_level_limits(InstanceId{7}, {}));
+}
+
+// --- Differentials ---------------------------------------------------------------------------------------------------
+
+TEST_F(RuntimeTest, ADifferentialOfAPinholeAsksForTheLevelsOfItsCone) {
+  Host host;
+  host.add(sphere());
+  host.plan(vec3(0, 0, 10), 1e-6f);  // levels are the rays' own choice
+  Rng rng(3);
+  for (int i = 0; i < 200; ++i) {
+    const vec3 direction = glm::normalize(vec3(0.08f * rng.next(), 0.08f * rng.next(), -1));
+    const float spread = std::exp2(-12.0f * rng.next());
+    RayContext cone, differential;
+    cone.path_seed = differential.path_seed = rng.next_uint();
+    cone.cone_spread = spread;
+    const vec3 right = glm::normalize(glm::cross(direction, vec3(0, 1, 0)));
+    differential.set_differential(
+        perspective_differential(direction, spread * right, spread * glm::cross(right, direction)), direction);
+    EmbreeRayHit a, b;
+    ASSERT_EQ(host.trace({0, 0, 10}, direction, cone, a), host.trace({0, 0, 10}, direction, differential, b));
+    if (a.hit.geomID != host.runtime().geometry_id()) continue;
+    EXPECT_EQ(a.ray.tfar, b.ray.tfar);
+    EXPECT_NEAR(cone.hit.lambda, differential.hit.lambda, 1e-4f);
+    EXPECT_NEAR(cone.hit.footprint, differential.hit.footprint, 1e-4f * cone.hit.footprint);
+  }
+}
+
+TEST_F(RuntimeTest, EitherAxisOfAFootprintCanAskForTheLevel) {
+  Host host;
+  host.add(sphere());
+  host.plan(vec3(0, 0, 10), 1e-6f);
+  const vec3 direction(0, 0, -1);
+  const auto lambda = [&](FootprintAxis axis) {
+    RayContext context;
+    context.set_differential(perspective_differential(direction, {0.08f, 0, 0}, {0, 0.02f, 0}), direction, axis);
+    EmbreeRayHit hit;
+    EXPECT_TRUE(host.trace({0.01f, 0, 10}, direction, context, hit));
+    return context.hit.lambda;
+  };
+  EXPECT_NEAR(lambda(FootprintAxis::Longer) - lambda(FootprintAxis::Shorter), 2.0f, 1e-4f);
+}
+
+TEST_F(RuntimeTest, SpawnGivesTheNextRayItsConeItsOriginAndItsDifferential) {
+  Host host(with_lambda(0.0f));
+  host.add(sphere());
+  host.plan();
+  const vec3 direction(0, 0, -1);
+  RayContext context;
+  context.cone_spread = 0.01f;
+  context.set_differential(perspective_differential(direction, {0.01f, 0, 0}, {0, 0.01f, 0}), direction);
+  EmbreeRayHit hit;
+  ASSERT_TRUE(host.trace({0.3f, 0.1f, 10}, direction, context, hit));
+  const Interaction interaction = host.interaction(hit, context);
+  ScatterSample mirror;
+  mirror.wi = glm::reflect(direction, interaction.geometric_normal);
+  mirror.pdf = std::numeric_limits<float>::infinity();
+  mirror.weight = vec3(1.0f);
+  RayContext next = context;
+  interaction.spawn(mirror, hit.ray.tfar, next);
+  EXPECT_EQ(next.origin_instance, 0u);
+  EXPECT_FLOAT_EQ(next.cone_width, 0.01f * hit.ray.tfar);
+  EXPECT_FLOAT_EQ(next.cone_spread, 0.01f);
+  // A flat mirror changes nothing about how a pencil of rays goes apart.
+  const FootprintAxes axes = next.footprint_growth.at(5.0f);
+  EXPECT_NEAR(axes.longer, 0.01f * (hit.ray.tfar + 5), 1e-4f);
+  EXPECT_NEAR(axes.shorter, 0.01f * (hit.ray.tfar + 5), 1e-4f);
+
+  ScatterSample diffuse = mirror;
+  diffuse.pdf = 1 / 3.14159265f;
+  RayContext wide = context;
+  interaction.spawn(diffuse, hit.ray.tfar, wide);
+  EXPECT_NEAR(wide.width_at(100) - next.width_at(100), 25.0f, 0.1f);  // a quarter radian
+}
+
 // --- Morphs ----------------------------------------------------------------------------------------------------------
 
 /// A sphere of radius 1 that swells by a tenth, then becomes fog: levels 0, 1, 2.
