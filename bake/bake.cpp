@@ -29,6 +29,7 @@
 #include "base/result.h"
 #include "bvh/level_scene.h"
 #include "bvh/ray_cost.h"
+#include "bvh/traced_morph.h"
 #include "cache/level_file.h"
 #include "prefilter/face_materials.h"
 #include "prefilter/macrosurface.h"
@@ -72,8 +73,9 @@ std::string canonical_options(const BakeOptions& options) {
   const std::string node = options.import.node < 0 ? "" : fmt::format("node={} ", options.import.node);
   const std::string import = fmt::format("mesh={} {}condition={}", options.import.mesh, node, kConditionVersion);
   if (options.source_only) return "source_only=1 " + import;
-  return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} {} voxelize={}", options.finest_grid,
-                     options.coarsest_grid, options.rays_per_voxel, import, kVoxelizeVersion);
+  constexpr int kMorphVersion = 1;  // of what the manifest has of morphs
+  return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} {} voxelize={} morph={}", options.finest_grid,
+                     options.coarsest_grid, options.rays_per_voxel, import, kVoxelizeVersion, kMorphVersion);
 }
 
 /// What a bake of `source` with these options writes into its manifest, but for the levels.
@@ -477,11 +479,21 @@ class Baker {
     entry.file_bytes = bytes;
     FARFIELD_TRY_LET(const auto hash, hash_level_file(path));
     entry.file_hash = hash;
+    if (!report_.manifest.levels.empty()) {
+      FARFIELD_TRY_LET(entry.morph, measure_morph_to(view));
+    }
     report_.manifest.levels.push_back(entry);
 
     add_to_hull(view, hull_);
     if (number > 0) from_stored_ = identity_maps(surface_.positions.size(), surface_.triangles.size());
     return {};
+  }
+
+  /// What the morph from the last written level to this one takes.
+  Result<LevelCost> measure_morph_to(const LevelView& level) const {
+    const fs::path finer = workspace_.asset_dir() / report_.manifest.levels.back().file;
+    FARFIELD_TRY_LET(const auto file, LevelFile::open(finer, LevelCheck::Structure));
+    return measure_morph(file->view(), level);
   }
 
   /// The source is always written. A coarser level must save a tenth against the last one written; for the root, which

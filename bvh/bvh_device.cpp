@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bvh/bvh_device.h"
 
+#include <fmt/format.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
 #include <thread>
 #include <utility>
+
+#include "base/bytes.h"
 
 namespace farfield {
 
@@ -24,13 +27,12 @@ bool BvhDevice::on_memory(void* self, ssize_t bytes, bool /*post*/) {
 }
 
 void BvhDevice::set_limit(uint64_t bytes) {
-  is_limit_exceeded_.store(false, std::memory_order_relaxed);
   limit_bytes_.store(static_cast<int64_t>(std::min<uint64_t>(bytes, kNoLimit)), std::memory_order_relaxed);
 }
 
 bool BvhDevice::end_limit() {
   limit_bytes_.store(kNoLimit, std::memory_order_relaxed);
-  return is_limit_exceeded_.load(std::memory_order_relaxed);
+  return is_limit_exceeded_.exchange(false, std::memory_order_relaxed);
 }
 
 Result<std::unique_ptr<BvhDevice>> BvhDevice::create() {
@@ -42,6 +44,35 @@ Result<std::unique_ptr<BvhDevice>> BvhDevice::create() {
   FARFIELD_TRY_LET(device->device_, make_embree_device(is_limited ? static_cast<int>(limit) : 0));
   set_memory_monitor(device->handle(), on_memory, device.get());
   return device;
+}
+
+Result<MeasuredScene> build_measured_scene(BvhDevice& device, const std::function<std::vector<EmbreeGeometry>()>& make,
+                                           std::string_view task, uint64_t most_bytes) {
+  const std::lock_guard lock(device.build_mutex());
+  const uint64_t bytes_before = device.bytes();
+  device.reset_peak();
+  forget_embree_error(device.handle());  // not ours
+
+  MeasuredScene result;
+  device.set_limit(bytes_before + std::min(most_bytes, kAnyBytes - bytes_before));
+  const std::vector<EmbreeGeometry> geometries = make();
+  const auto made = static_cast<uint64_t>(
+      std::ranges::count_if(geometries, [](const EmbreeGeometry& geometry) { return geometry != nullptr; }));
+  const uint64_t overhead_bytes = kSceneOverheadBytes + made * kGeometryOverheadBytes;
+  const uint64_t most_of_embree = most_bytes - std::min(most_bytes, overhead_bytes);
+  device.set_limit(bytes_before + std::min(most_of_embree, kAnyBytes - bytes_before));
+  result.scene = build_static_scene(device.handle(), geometries);
+  if (device.end_limit()) {
+    forget_embree_error(device.handle());
+    return make_error(ErrorCode::OutOfBudget,
+                      fmt::format("cannot {}: it takes more than {}", task, format_bytes(most_bytes)));
+  }
+  FARFIELD_TRY(check_embree(device.handle(), task));
+
+  const uint64_t bytes_after = device.bytes();
+  result.bytes = bytes_after - std::min(bytes_before, bytes_after) + overhead_bytes;
+  result.build_peak_bytes = device.peak_bytes() - bytes_after;
+  return result;
 }
 
 }  // namespace farfield

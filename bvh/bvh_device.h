@@ -4,9 +4,12 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <string_view>
+#include <vector>
 
 #include "base/embree.h"
 #include "base/result.h"
@@ -35,7 +38,7 @@ class BvhDevice {
   /// Embree gets no memory that would take bytes() above this: the build in progress then fails. For builds, under
   /// build_mutex().
   void set_limit(uint64_t bytes);
-  /// Takes the limit away. True: Embree has asked for more than it allowed.
+  /// Takes the limit away. True: Embree has asked for more than one of the limits since the last call.
   bool end_limit();
 
  private:
@@ -51,5 +54,26 @@ class BvhDevice {
   std::atomic<bool> is_limit_exceeded_{false};
   EmbreeDevice device_;  // last, so released first: what it gives back is still counted
 };
+
+/// As much memory as there is.
+inline constexpr uint64_t kAnyBytes = std::numeric_limits<uint64_t>::max();
+
+/// What Embree does not report: scene objects, geometry objects and malloc's rounding, measured on 3.13.5.
+inline constexpr uint64_t kSceneOverheadBytes = 3072;
+inline constexpr uint64_t kGeometryOverheadBytes = 300;
+
+/// A committed scene and what it takes; nothing at all without geometries. Movable.
+struct MeasuredScene {
+  EmbreeScene scene;
+  uint64_t bytes = 0;             ///< that the scene holds, overheads included
+  uint64_t build_peak_bytes = 0;  ///< further ones at the worst moment of the build
+};
+
+/// Builds a scene of what `make` makes (see build_static_scene) on the calling thread alone, so that the same
+/// geometries always take the same bytes; Embree gets no more than `most_bytes` for it, at the worst moment. Holds
+/// device.build_mutex(). task: for the message. Errors: OutOfBudget (most_bytes are not enough), Io (out of memory, or
+/// what else Embree says).
+Result<MeasuredScene> build_measured_scene(BvhDevice& device, const std::function<std::vector<EmbreeGeometry>()>& make,
+                                           std::string_view task, uint64_t most_bytes = kAnyBytes);
 
 }  // namespace farfield

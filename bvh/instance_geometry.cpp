@@ -21,6 +21,7 @@
 
 #include "base/check.h"
 #include "base/hash.h"
+#include "bvh/traced_morph.h"
 
 namespace farfield {
 
@@ -59,15 +60,8 @@ class InLocalSpace {
   vec3 direction_;
 };
 
-/// trace_nearest that leaves the outer hit's ids alone if it finds nothing.
-bool intersect_surface(EmbreeSceneRef scene, EmbreeContext& context, EmbreeRayHit& ray_hit) {
-  const unsigned outer_id = ray_hit.hit.geomID;
-  if (trace_nearest(scene, context, ray_hit)) return true;
-  ray_hit.hit.geomID = outer_id;
-  return false;
-}
-
-uint64_t flight_seed(const RayContext& context, uint32_t instance) { return mix64(context.ray_seed, instance); }
+/// Random bits of a ray in an instance.
+uint64_t bits_of_ray(const RayContext& context, uint32_t instance) { return mix64(context.ray_seed, instance); }
 
 glm::dmat3 linear_part(const mat4x3& m) { return {glm::dvec3(m[0]), glm::dvec3(m[1]), glm::dvec3(m[2])}; }
 
@@ -146,8 +140,9 @@ Box3 instance_bounds(const InstanceRecord& instance, const TracedAsset& asset) {
 /// A ray that enters an instance: with which level it deals there.
 struct InstanceGeometry::Visit {
   LocalRay ray;
-  const TracedLevel* level;
   LevelChoice choice;
+  const TracedLevel* level = nullptr;
+  const TracedMorph* morph = nullptr;  ///< in place of the level
 };
 
 /// Fills in `visit`. False: the ray passes by.
@@ -160,9 +155,59 @@ bool InstanceGeometry::enter(uint32_t instance, const EmbreeRay& ray, const RayC
   if (!(range.t_near * (1.0f - kRangePad) <= range.t_far * (1.0f + kRangePad))) return false;
 
   visit.choice = choose_level(asset, record.footprint, instance, context, range.t_near, forced_lambda);
+  if (visit.choice.blend > 0.0f) {
+    visit.morph = asset.morphs[visit.choice.slot].load(std::memory_order_acquire);
+    if (!visit.morph) visit.morph = source_.serve_morph(record.asset, visit.choice.slot);
+    if (visit.morph) return true;
+    visit.choice.slot = dissolve({visit.choice.slot, visit.choice.slot + 1, visit.choice.blend}, instance, context);
+    visit.choice.blend = 0.0f;
+  }
   visit.level = asset.loaded[visit.choice.slot].load(std::memory_order_acquire);
   if (!visit.level) visit.level = source_.serve(record.asset, visit.choice.slot);
   return visit.level != nullptr;
+}
+
+/// The nearest hit on a level, and what the record has of it. False: none, and ray_hit's ids are not to be trusted.
+bool InstanceGeometry::intersect_level(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
+                                       EmbreeContext& embree_context, HitRecord& made) {
+  const TracedLevel& level = *visit.level;
+  RTCHit& hit = ray_hit.hit;
+  bool on_surface = false;
+  if (level.scene.handle()) {
+    const InLocalSpace scope(ray_hit.ray, visit.ray);
+    on_surface = trace_nearest(level.scene.handle(), embree_context, ray_hit);
+  }
+  made.level_slot = static_cast<uint8_t>(level.slot);
+  if (!level.volume.is_empty()) {
+    LocalRay up_to_surface = visit.ray;
+    up_to_surface.t_far = ray_hit.ray.tfar;
+    if (const auto collision = level.volume.first_collision(up_to_surface, flight_seed(ray_bits, level.slot))) {
+      ray_hit.ray.tfar = collision->t;
+      made.is_volume = true;
+      made.element = collision->payload;
+      return true;
+    }
+  }
+  if (!on_surface) return false;
+  made.element = 2 * hit.primID + quad_side(hit.u, hit.v);
+  const vec2 barycentric = face_barycentric(hit.u, hit.v);
+  made.barycentric[0] = barycentric.x, made.barycentric[1] = barycentric.y;
+  return true;
+}
+
+/// The same on a morph.
+bool InstanceGeometry::intersect_morph(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
+                                       EmbreeContext& embree_context, HitRecord& made) {
+  const InLocalSpace scope(ray_hit.ray, visit.ray);
+  const auto found = visit.morph->intersect(ray_hit, embree_context, visit.choice.blend, ray_bits);
+  if (!found) return false;
+  made.level_slot = static_cast<uint8_t>(visit.choice.slot);
+  made.blend = visit.choice.blend;
+  made.is_volume = found->is_volume;
+  made.is_coarser = found->is_coarser;
+  made.element = found->element;
+  made.barycentric[0] = found->barycentric.x, made.barycentric[1] = found->barycentric.y;
+  return true;
 }
 
 bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, EmbreeRayHit& ray_hit,
@@ -171,37 +216,24 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
   if (!enter(instance, ray_hit.ray, context, visit)) return false;
   EmbreeRay& ray = ray_hit.ray;
   RTCHit& hit = ray_hit.hit;
-
-  bool on_surface = false;
-  if (visit.level->scene.handle()) {
-    const InLocalSpace scope(ray, visit.ray);
-    on_surface = intersect_surface(visit.level->scene.handle(), *embree_context, ray_hit);
-  }
-  std::optional<VolumeHit> collision;
-  if (!visit.level->volume.is_empty()) {
-    LocalRay up_to_surface = visit.ray;
-    up_to_surface.t_far = ray.tfar;
-    collision = visit.level->volume.first_collision(up_to_surface, flight_seed(context, instance));
-  }
-  if (!on_surface && !collision) return false;
-
+  const unsigned outer_id = hit.geomID;
   HitRecord made;
+  const bool is_hit = visit.morph
+                          ? intersect_morph(visit, bits_of_ray(context, instance), ray_hit, *embree_context, made)
+                          : intersect_level(visit, bits_of_ray(context, instance), ray_hit, *embree_context, made);
+  if (!is_hit) {
+    hit.geomID = outer_id;
+    return false;
+  }
   made.instance = instance;
-  made.level_slot = static_cast<uint8_t>(visit.level->slot);
   const InstanceRecord& hit_instance = instances[instance];
   made.lambda = lambda_of_choice(*assets[hit_instance.asset], hit_instance.footprint, visit.choice, forced_lambda);
   vec3 normal_world(0.0f);
-  if (collision) {
-    ray.tfar = collision->t;
-    made.is_volume = true;
-    made.element = collision->payload;
+  if (made.is_volume) {
     hit.u = hit.v = 0.0f;
     hit.instID[0] = embree_context->instID[0];
   } else {
     const vec3 normal(hit.Ng_x, hit.Ng_y, hit.Ng_z);
-    made.element = 2 * hit.primID + quad_side(hit.u, hit.v);
-    const vec2 barycentric = face_barycentric(hit.u, hit.v);
-    made.barycentric[0] = barycentric.x, made.barycentric[1] = barycentric.y;
     made.normal_local[0] = normal.x, made.normal_local[1] = normal.y, made.normal_local[2] = normal.z;
     normal_world = hit_instance.normal_to_world(normal);
   }
@@ -217,12 +249,18 @@ bool InstanceGeometry::occluded(uint32_t instance, EmbreeRay& ray, const RayCont
                                 EmbreeContext* embree_context) const {
   Visit visit;
   if (!enter(instance, ray, context, visit)) return false;
+  if (visit.morph) {
+    const InLocalSpace scope(ray, visit.ray);
+    return visit.morph->occluded(ray, *embree_context, visit.choice.blend, bits_of_ray(context, instance));
+  }
   if (visit.level->scene.handle()) {
     const InLocalSpace scope(ray, visit.ray);
     if (trace_occlusion(visit.level->scene.handle(), *embree_context, ray)) return true;
   }
   const BrickVolume& volume = visit.level->volume;
-  if (volume.is_empty() || !volume.first_collision(visit.ray, flight_seed(context, instance))) return false;
+  if (volume.is_empty() ||
+      !volume.first_collision(visit.ray, flight_seed(bits_of_ray(context, instance), visit.level->slot)))
+    return false;
   ray.tfar = -kInfinity;
   return true;
 }

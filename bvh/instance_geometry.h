@@ -75,6 +75,10 @@ class InstanceGeometry {
   struct Visit;
   struct Query;
   bool intersect_filtered(const Query& query, EmbreeRayHit& ray_hit, HitRecord* record) const;
+  static bool intersect_level(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
+                              EmbreeContext& embree_context, HitRecord& made);
+  static bool intersect_morph(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
+                              EmbreeContext& embree_context, HitRecord& made);
   bool enter(uint32_t instance, const EmbreeRay& ray, const RayContext& context, Visit& visit) const;
   bool intersect(uint32_t instance, unsigned geometry_id, EmbreeRayHit& ray_hit, const RayContext& context,
                  EmbreeContext* embree_context, HitRecord* record) const;

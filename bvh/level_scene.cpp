@@ -5,10 +5,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <vector>
 
-#include "base/bytes.h"
 #include "base/result.h"
 #include "cache/level_file.h"
 
@@ -18,30 +16,18 @@ Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, 
                                      EmbreeFilter filter, void* user) {
   LevelScene result;
   if (!level.has_surface()) return result;
-
-  const std::lock_guard lock(device.build_mutex());
-  const uint64_t bytes_before = device.bytes();
-  device.reset_peak();
-  forget_embree_error(device.handle());  // not ours
-
-  const EmbreeGeometry quads = new_quads(device.handle());
-  share_array(quads.get(), level.positions);
-  share_array(quads.get(), level.quads);
-  if (filter) set_filter(quads.get(), filter, user);
-  constexpr uint64_t kOverheadBytes = kSceneOverheadBytes + kGeometryOverheadBytes;
-  const uint64_t most_of_embree = most_bytes - std::min(most_bytes, kOverheadBytes);
-  device.set_limit(bytes_before + std::min(most_of_embree, kAnyBytes - bytes_before));
-  result.scene_ = build_static_scene(device.handle(), quads.get());
-  if (device.end_limit()) {
-    forget_embree_error(device.handle());
-    return make_error(ErrorCode::OutOfBudget, fmt::format("the BVH of {} quads takes more than {}", level.quads.size(),
-                                                          format_bytes(most_bytes)));
-  }
-  FARFIELD_TRY(check_embree(device.handle(), fmt::format("build a BVH of {} quads", level.quads.size())));
-
-  const uint64_t bytes_after = device.bytes();
-  result.bytes_ = bytes_after - std::min(bytes_before, bytes_after) + kOverheadBytes;
-  result.build_peak_bytes_ = device.peak_bytes() - bytes_after;
+  const auto make = [&] {
+    std::vector<EmbreeGeometry> geometries;
+    geometries.push_back(new_quads(device.handle()));
+    const EmbreeGeometryRef quads = geometries.back().get();
+    share_array(quads, level.positions);
+    share_array(quads, level.quads);
+    if (filter) set_filter(quads, filter, user);
+    return geometries;
+  };
+  FARFIELD_TRY_LET(
+      result.built_,
+      build_measured_scene(device, make, fmt::format("build a BVH of {} quads", level.quads.size()), most_bytes));
   return result;
 }
 

@@ -58,7 +58,9 @@ Problem find_level_problem(const LevelEntry& level) {
   if (!is_plain_file_name(level.file)) {
     return fmt::format("\"{}\" is not a file name inside the folder", printable(level.file));
   }
-  for (const uint64_t bytes : {level.file_bytes, level.resident_bytes, level.build_peak_bytes}) {
+  const LevelCost morph = level.morph.value_or(LevelCost());
+  for (const uint64_t bytes :
+       {level.file_bytes, level.resident_bytes, level.build_peak_bytes, morph.resident_bytes, morph.build_peak_bytes}) {
     if (bytes > kMaxBytes) return fmt::format("{} bytes are more than any level has", bytes);
   }
   for (const uint64_t count : {level.triangles, level.voxels, level.bricks}) {
@@ -165,6 +167,9 @@ LevelEntry level_from_json(const Json& json, const std::string& where, FieldRead
   level.resident_bytes = read.count(json, "resident_bytes", where);
   level.build_peak_bytes = read.count(json, "build_peak_bytes", where);
   if (json.is_object() && json.contains("ray_cost")) level.ray_cost = read.number(json, "ray_cost", where);
+  if (json.is_object() && json.contains("morph_resident_bytes")) {
+    level.morph = {read.count(json, "morph_resident_bytes", where), read.count(json, "morph_build_peak_bytes", where)};
+  }
   if (json.is_object() && json.contains("errors")) {
     level.errors = errors_from_json(json["errors"], where + ".errors", read);
   }
@@ -246,6 +251,10 @@ OrderedJson to_json(const LevelEntry& level) {
                       {"resident_bytes", level.resident_bytes},
                       {"build_peak_bytes", level.build_peak_bytes}};
   if (level.ray_cost != 0) json["ray_cost"] = level.ray_cost;
+  if (level.morph) {
+    json["morph_resident_bytes"] = level.morph->resident_bytes;
+    json["morph_build_peak_bytes"] = level.morph->build_peak_bytes;
+  }
   if (level.errors) {
     OrderedJson errors = {{"occlusion_error", level.errors->occlusion_error}};
     add_error_size(errors, "occlusion_rms", level.errors->occlusion_rms);

@@ -13,6 +13,7 @@
 #include "base/result.h"
 #include "base/vec.h"
 #include "cache/asset_material.h"
+#include "cache/level.h"
 
 namespace farfield {
 
@@ -51,9 +52,10 @@ struct LevelEntry {
   uint64_t triangles = 0;
   uint64_t voxels = 0;
   uint64_t bricks = 0;
-  uint64_t resident_bytes = 0;    ///< bytes of the file that stay, plus BVH, once loaded
-  uint64_t build_peak_bytes = 0;  ///< further bytes needed while the BVH is built
-  double ray_cost = 0;            ///< work of a ray (bvh/ray_cost.h), >= 0; 0: not recorded
+  uint64_t resident_bytes = 0;     ///< bytes of the file that stay, plus BVH, once loaded
+  uint64_t build_peak_bytes = 0;   ///< further bytes needed while the BVH is built
+  double ray_cost = 0;             ///< work of a ray (bvh/ray_cost.h), >= 0; 0: not recorded
+  std::optional<LevelCost> morph;  ///< what the morph from the next finer stored level takes; absent: not recorded
   std::optional<LevelErrors> errors;
 };
 

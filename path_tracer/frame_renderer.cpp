@@ -59,7 +59,9 @@ std::string make_fingerprint(const RenderOptions& options, std::span<const fs::p
       options.budget_bytes, options.pixel_error, static_cast<int>(options.blend), options.full_detail,
       options.exposure_stops, options.cryptomatte, options.camera, options.frames_per_second, identity(options.scene),
       identity(options.environment), options.sky);
-  if (options.turn_sun) text += " sun turned";  // said only then: shots from before know no other
+  // Said only where they differ: shots from before know no others.
+  if (options.turn_sun) text += " sun turned";
+  if (options.blend_window != 1.0f) text += fmt::format(" blend window {}", options.blend_window);
   for (const fs::path& folder : asset_folders)
     if (!folder.empty()) text += fmt::format(" {}:{}", folder.filename().string(), to_hex(manifest_hash(folder)));
   return text;
@@ -218,7 +220,8 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     if (auto taken = sink(film.image(), metadata, report); !taken) return tl::unexpected(taken.error());
   }
   report.peak_rss_bytes = memory.peak_bytes();
-  if (const auto notice = budget_notice(report)) options_.warning(*notice);
+  for (const auto& notice : {budget_notice(report), morph_notice(report)})
+    if (notice) options_.warning(*notice);
   report.warnings = warnings_->lines();
   return report;
 }

@@ -30,6 +30,7 @@ struct RenderOptions {
   std::filesystem::path assets;
   float pixel_error = 1.0f;  ///< RuntimeOptions::pixel_error
   Blend blend = Blend::Dissolve;
+  float blend_window = 1.0f;          ///< RuntimeOptions::blend_window
   bool full_detail = false;           ///< level 0 only, from assets baked with --source-only
   std::filesystem::path environment;  ///< EXR or Radiance HDR; empty: sun and sky, see make_lights()
   bool sky = true;                    ///< false: without an environment there is no light but the scene's own
@@ -62,6 +63,8 @@ struct FrameReport {
   uint64_t invalid_samples = 0;        ///< paths whose value was not finite; black in the image
   double bias = 0;                     ///< PlanSummary::bias
   uint64_t asked_bytes = 0;            ///< a budget that would give nothing up
+  uint32_t morphs = 0;                 ///< PlanSummary::morphs
+  uint32_t morphs_given_up = 0;        ///< PlanSummary::morphs_given_up
   std::vector<uint32_t> finest_level;  ///< per asset of RenderReport::assets: finest level that rays may use
   std::vector<float> levels_given_up;  ///< per asset: how many levels coarser than asked, for the budget's sake
 

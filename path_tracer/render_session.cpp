@@ -27,6 +27,7 @@ RuntimeOptions runtime_options(const RenderOptions& options, bool has_small_scen
   if (has_small_scene) runtime.scene_bytes_per_instance = kSmallSceneBytesPerInstance;
   runtime.budget_bytes = options.budget_bytes;
   runtime.blend = options.blend;
+  runtime.blend_window = options.blend_window;
   runtime.pixel_error = options.pixel_error;
   if (options.full_detail) runtime.forced_lambda = 0.0f;
   runtime.messages = [message = options.message, warning = options.warning](Severity severity,
@@ -128,6 +129,8 @@ Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& li
   report.invalid_samples = traced.invalid_samples;
   report.bias = plan.bias;
   report.asked_bytes = plan.asked_bytes;
+  report.morphs = plan.morphs;
+  report.morphs_given_up = plan.morphs_given_up;
   report.finest_level = std::move(plan.finest_level);
   report.levels_given_up = std::move(plan.levels_given_up);
   return report;

@@ -32,6 +32,8 @@ Json frame_to_json(const FrameReport& frame, const std::vector<std::string>& ass
           {"rss_bytes", frame.rss_bytes},
           {"bias", frame.bias},
           {"asked_bytes", frame.asked_bytes},
+          {"morphs", frame.morphs},
+          {"morphs_given_up", frame.morphs_given_up},
           {"rays", frame.rays},
           {"levels_loaded", frame.levels_loaded},
           {"fallbacks", frame.fallbacks},
@@ -51,6 +53,8 @@ FrameReport frame_from_json(const Json& json, const std::vector<std::string>& as
   json.at("rss_bytes").get_to(frame.rss_bytes);
   json.at("bias").get_to(frame.bias);
   json.at("asked_bytes").get_to(frame.asked_bytes);
+  frame.morphs = json.value("morphs", 0u);  // absent before there were any
+  frame.morphs_given_up = json.value("morphs_given_up", 0u);
   json.at("rays").get_to(frame.rays);
   json.at("levels_loaded").get_to(frame.levels_loaded);
   json.at("fallbacks").get_to(frame.fallbacks);

@@ -114,22 +114,30 @@ Result<PlanSummary> FramePlanner::plan(LevelStore& levels) {
   summary.bias = plan->bias;
   summary.levels_given_up = plan->levels_given_up;
   summary.asked_bytes = plan->asked_bytes;
+  for (const std::vector<uint8_t>& slots : plan->morphs) summary.morphs += static_cast<uint32_t>(slots.size());
+  summary.morphs_given_up = plan->morphs_given_up;
   return summary;
 }
 
 void FramePlanner::prefetch(LevelStore& levels) const {
   std::vector<std::vector<bool>> is_needed(levels.asset_count());
   for (uint32_t i = 0; i < levels.asset_count(); ++i) is_needed[i].resize(levels.asset(i).traced.slot_count());
+  auto is_morph_needed = is_needed;
   for (uint32_t i = 0; i < geometry_.instances.size(); ++i) {
     if (geometry_.is_hidden(i)) continue;
     const InstanceRecord& instance = geometry_.instances[i];
     const SlotBlend slots = split_slots(*geometry_.assets[instance.asset], wanted_lambda(instance));
     is_needed[instance.asset][slots.slot] = true;
-    if (slots.blend > 0.0f) is_needed[instance.asset][slots.coarser] = true;
+    if (!(slots.blend > 0.0f)) continue;
+    is_needed[instance.asset][slots.coarser] = true;
+    is_morph_needed[instance.asset][slots.slot] = geometry_.assets[instance.asset]->may_morph(slots.slot);
   }
   for (uint32_t i = 0; i < levels.asset_count(); ++i) {
     for (size_t slot = is_needed[i].size(); slot-- > 0;) {  // coarse ones first: they are what others fall back to
       if (is_needed[i][slot]) levels.load(i, static_cast<uint32_t>(slot));
+    }
+    for (size_t slot = 0; slot < is_morph_needed[i].size(); ++slot) {
+      if (is_morph_needed[i][slot]) levels.load_morph(i, static_cast<uint32_t>(slot));
     }
   }
 }

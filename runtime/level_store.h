@@ -30,6 +30,7 @@ class LevelStore final : public LevelSource {
 
   // Rays
   const TracedLevel* serve(uint32_t asset, uint32_t slot) override;
+  const TracedMorph* serve_morph(uint32_t asset, uint32_t slot) override;
 
   // Between frames
   /// The asset in a (canonical) folder, opened with its root if it is not yet. Errors: those of Runtime::open_asset.
@@ -58,6 +59,8 @@ class LevelStore final : public LevelSource {
   void apply(const Plan& plan, uint64_t texture_bytes);
   /// Loads a level that the plan allows; in progressive mode only asks for it.
   void load(uint32_t asset, uint32_t slot);
+  /// The same for its morph to the next, whose levels were loaded before.
+  void load_morph(uint32_t asset, uint32_t slot);
 
   ResidencyStats stats() const { return levels_.stats(); }
   uint64_t fallbacks() const { return fallbacks_.load(std::memory_order_relaxed); }
@@ -66,16 +69,24 @@ class LevelStore final : public LevelSource {
   struct ItemOwner {
     OpenAsset* asset;
     uint32_t slot;
+    bool is_morph;
   };
 
   PlanAsset plan_asset(const OpenAsset& asset) const;
+  void add_items(OpenAsset& asset);
+  void add_item(OpenAsset& asset, uint32_t slot, bool is_morph, std::vector<size_t>& numbers);
   Result<void> load_root(OpenAsset& asset);
+  const TracedLevel* find_level(OpenAsset& asset, uint32_t slot, bool& may_ask);
+  /// An item that is there, or that may be waited for; else it is asked for, if may_ask, which is false from then on.
+  const Resident* find(size_t item, bool& may_ask);
   Result<Plan> plan_roots(const OpenAsset* newcomer) const;
   void count_freed(uint64_t bytes);
   void report_broken(size_t item, const Error& error);
 
   const uint64_t budget_bytes_;
   const Residency residency_;
+  const Blend blend_;
+  const float blend_window_;
   Messages& messages_;
   TextureCache textures_;
   uint64_t texture_bytes_ = 0;  ///< that the plan in force gives textures_

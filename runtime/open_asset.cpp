@@ -95,13 +95,30 @@ Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::
   return LoadedItem{std::move(loaded), cost.resident_bytes, cost.build_peak_bytes};
 }
 
+Result<LoadedItem> load_morph(const OpenAsset& asset, uint32_t slot, BvhDevice& device, uint64_t bytes_left) {
+  const auto open = [&](uint32_t level) {
+    return LevelFile::open_known(asset.folder / asset.file_names[level], asset.levels[level].file_bytes,
+                                 asset.file_hashes[level]);
+  };
+  FARFIELD_TRY_LET(const auto fine, open(slot));
+  FARFIELD_TRY_LET(const auto coarse, open(slot + 1));
+  const uint64_t files = level_file_sizes(fine->view()).memory_bytes + level_file_sizes(coarse->view()).memory_bytes;
+  auto loaded = std::make_unique<LoadedMorph>();
+  FARFIELD_TRY_LET(loaded->traced, TracedMorph::build(device, fine->view(), coarse->view(),
+                                                      *asset.traced.loaded[slot].load(std::memory_order_acquire),
+                                                      *asset.traced.loaded[slot + 1].load(std::memory_order_acquire),
+                                                      bytes_left - std::min(bytes_left, files)));
+  const LevelCost cost = loaded->traced->cost(fine->view(), coarse->view());
+  return LoadedItem{std::move(loaded), cost.resident_bytes, cost.build_peak_bytes};
+}
+
 }  // namespace
 
 uint64_t OpenAsset::table_bytes() const {
-  constexpr uint64_t kPerLevel = sizeof(LevelInfo) + 3 * sizeof(uint64_t) + 2 * sizeof(float) + sizeof(void*) +
-                                 512;  // the ResidentSet's item and its function
-  return sizeof(OpenAsset) + close_up->table_bytes() + traced.hull.capacity() * sizeof(vec3) +
-         levels.size() * kPerLevel;
+  constexpr uint64_t kItem = 512;  // of the ResidentSet, with its function
+  constexpr uint64_t kPerLevel = sizeof(LevelInfo) + 3 * sizeof(uint64_t) + 2 * sizeof(float) + sizeof(void*) + kItem;
+  return sizeof(OpenAsset) + morph_items.size() * kItem + close_up->table_bytes() +
+         traced.hull.capacity() * sizeof(vec3) + levels.size() * kPerLevel;
 }
 
 Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folder, MaterialFunction materials,
@@ -122,6 +139,7 @@ Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folde
   traced.hull.assign(manifest.hull.begin(), manifest.hull.end());
   traced.base_resolution = static_cast<float>(manifest.base_resolution);
   traced.loaded = std::make_unique<std::atomic<const TracedLevel*>[]>(manifest.levels.size());
+  traced.morphs = std::make_unique<std::atomic<const TracedMorph*>[]>(manifest.levels.size());
   for (const LevelEntry& entry : manifest.levels) {
     FARFIELD_TRY(check_level_file(folder / entry.file, entry.file_bytes));
     FARFIELD_TRY(check_planned_bytes(entry, folder));
@@ -130,9 +148,11 @@ Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folde
                              entry.file_bytes, entry.resident_bytes});
     asset->build_peak_bytes.push_back(entry.build_peak_bytes);
     asset->ray_cost.push_back(static_cast<float>(entry.ray_cost));
+    if (entry.level != manifest.levels.front().level) asset->morph_costs.push_back(entry.morph);
     asset->file_names.push_back(entry.file);
     asset->file_hashes.push_back(entry.file_hash);
   }
+  asset->morph_costs.emplace_back();  // the root's
   asset->close_up = std::make_unique<CloseUp>(folder, manifest, std::move(materials), textures);
   return asset;
 }
@@ -142,6 +162,12 @@ ResidencyItem make_level_item(const OpenAsset& asset, uint32_t slot, BvhDevice& 
           [&asset, slot, &device](uint64_t bytes_left) {
             return load_level(asset, slot, asset.folder / asset.file_names[slot], device, bytes_left);
           }};
+}
+
+ResidencyItem make_morph_item(const OpenAsset& asset, uint32_t slot, BvhDevice& device) {
+  const LevelCost& cost = *asset.morph_costs[slot];
+  return {cost.resident_bytes, cost.build_peak_bytes,
+          [&asset, slot, &device](uint64_t bytes_left) { return load_morph(asset, slot, device, bytes_left); }};
 }
 
 }  // namespace farfield

@@ -24,6 +24,7 @@ Result<void> check_options(const RuntimeOptions& options) {
   if (options.budget_bytes == 0) return invalid("the budget is 0 bytes; give RuntimeOptions::budget_bytes a size");
   if (!(options.pixel_error > 0.0f) || !std::isfinite(options.pixel_error))
     return invalid("pixel_error must be positive");
+  if (!(options.blend_window > 0.0f && options.blend_window <= 1.0f)) return invalid("blend_window must be in (0, 1]");
   if (options.forced_lambda && !std::isfinite(*options.forced_lambda)) return invalid("forced_lambda must be finite");
   return {};
 }
@@ -72,7 +73,8 @@ struct Runtime::Impl {
     return instance.value < geometry.instances.size() && !free_ids.contains(instance.value);
   }
   Result<InstanceRecord> make_record(uint32_t asset, const mat4x3& local_to_world) const;
-  const TracedLevel* level_of(const HitRecord& hit) const;
+  /// What was hit; its level is null if the record is not of a hit, or the level has gone since.
+  HitLevels levels_of(const HitRecord& hit) const;
 
   const RuntimeOptions options;
   Messages messages;
@@ -85,13 +87,20 @@ struct Runtime::Impl {
   std::atomic<bool> said_stale_hit{false};
 };
 
-/// The level that was hit; null if the record is not of a hit, or the level has gone since.
-const TracedLevel* Runtime::Impl::level_of(const HitRecord& hit) const {
-  if (hit.instance >= geometry.instances.size()) return nullptr;
+HitLevels Runtime::Impl::levels_of(const HitRecord& hit) const {
+  if (hit.instance >= geometry.instances.size()) return {};
   const TracedAsset& asset = *geometry.assets[geometry.instances[hit.instance].asset];
-  if (hit.level_slot >= asset.slot_count()) return nullptr;
-  const TracedLevel* level = asset.loaded[hit.level_slot].load(std::memory_order_acquire);
-  return level && is_hit_of(*level, hit) ? level : nullptr;
+  if (hit.level_slot >= asset.slot_count()) return {};
+  HitLevels found;
+  if (hit.blend > 0.0f) {
+    found.morph = asset.morphs[hit.level_slot].load(std::memory_order_acquire);
+    if (!found.morph) return {};
+    found.level = hit.is_coarser ? &found.morph->coarse() : &found.morph->fine();
+  } else {
+    found.level = asset.loaded[hit.level_slot].load(std::memory_order_acquire);
+  }
+  if (found.level && !is_hit_of(*found.level, hit)) return {};
+  return found;
 }
 
 Runtime::Runtime() = default;
@@ -220,13 +229,13 @@ Result<unsigned> Runtime::attach(RTCScene scene) { return impl_->host.attach(sce
 unsigned Runtime::geometry_id() const { return impl_->host.geometry_id(); }
 
 Interaction Runtime::interaction(const RTCRayHit& ray_hit, const RayContext& context) const {
-  const TracedLevel* level = impl_->level_of(context.hit);
-  if (!level) {
+  const HitLevels levels = impl_->levels_of(context.hit);
+  if (!levels.level) {
     impl_->messages.report_once(impl_->said_stale_hit, Severity::Error,
                                 "interaction() of what is no hit of ours since the last plan_frame(); it is black");
     return {};
   }
-  return make_interaction(*level, impl_->geometry.instances[context.hit.instance], ray_hit, context.hit);
+  return make_interaction(levels, impl_->geometry.instances[context.hit.instance], ray_hit, context.hit);
 }
 
 Stats Runtime::stats() const {

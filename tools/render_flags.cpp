@@ -21,9 +21,9 @@ namespace {
 
 Result<Blend> parse_blend(const std::string& text) {
   if (text == "dissolve") return Blend::Dissolve;
-  if (text == "morph")
-    return make_error(ErrorCode::Unsupported, "this version cannot morph; levels carry the data, dissolve works");
-  return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a way to blend; dissolve is", text));
+  if (text == "morph") return Blend::Morph;
+  return make_error(ErrorCode::InvalidArgument,
+                    fmt::format("\"{}\" is not a way to blend; dissolve and morph are", text));
 }
 
 }  // namespace
@@ -45,8 +45,15 @@ void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std:
   command->add_option("--seed", options.trace.seed, "Of the random numbers");
   command->add_option("--assets", arguments.assets,
                       "Folder of baked assets; what is missing is baked. Without it farfield-assets beside the scene");
-  add_parsed_option(command, "--blend", options.blend, parse_blend, "How neighbouring levels are mixed: dissolve")
+  add_parsed_option(command, "--blend", options.blend, parse_blend,
+                    "How neighbouring levels are mixed: dissolve (each path sees one of them) or morph (they change "
+                    "into each other in place; more memory, slower)")
       ->default_str("dissolve");
+  command
+      ->add_option("--blend-window", options.blend_window,
+                   "Octaves of distance before a coarser level over which it blends with the finer one")
+      ->check(CLI::Range(0.001, 1.0))
+      ->default_str("1");
   CLI::Option* environment = command->add_option("--environment", arguments.environment,
                                                  "Light from a latitude-longitude picture, EXR or Radiance HDR");
   command->add_flag("!--no-sky", options.sky, "No sun and sky: the scene's own lights alone")->excludes(environment);

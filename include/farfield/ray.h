@@ -17,6 +17,8 @@ struct HitRecord {
   uint32_t element = 0;    ///< 2 * quad + side of its diagonal, or payload index of the voxel
   uint8_t level_slot = 0;  ///< index into the asset's stored levels
   bool is_volume = false;
+  bool is_coarser = false;            ///< of a morph: `element` is of the level after level_slot
+  float blend = 0;                    ///< in (0, 1): of a morph from level_slot to the next; 0: of that level alone
   float lambda = 0;                   ///< continuous level that was asked for
   float footprint = 0;                ///< world width of what the ray stands for there
   float normal_local[3] = {0, 0, 0};  ///< geometric normal, instance space, unnormalised; surfaces only
@@ -54,6 +56,7 @@ struct RayContext {
   // In: where the ray starts. A ray that leaves a Farfield hit keeps that hit's level on the same instance.
   uint32_t origin_instance = kNoInstance;
   uint8_t origin_level_slot = 0;
+  float origin_blend = 0;
 
   // Out: valid after rtcIntersect1 if and only if ray_hit.hit.geomID is Runtime::geometry_id().
   HitRecord hit;
@@ -68,6 +71,7 @@ struct RayContext {
   void set_origin(const HitRecord& from) {
     origin_instance = from.instance;
     origin_level_slot = from.level_slot;
+    origin_blend = from.blend;
   }
 };
 

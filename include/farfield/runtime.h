@@ -45,6 +45,8 @@ namespace farfield {
 /// How two neighbouring levels are mixed (docs/architecture.md, decision 3).
 enum class Blend : uint8_t {
   Dissolve,  ///< each path sees one of the two, picked by RayContext::path_seed
+  Morph,     ///< vertices move, materials mix, and what one of the two lacks fades, all in place; where the memory for
+             ///< that does not fit the budget, or the asset was baked before there were morphs, it dissolves
 };
 
 /// What a ray does that needs a level which the plan allows but which is not loaded yet.
@@ -66,6 +68,7 @@ inline constexpr uint32_t kSmallSceneBytesPerInstance = 64;
 struct RuntimeOptions {
   uint64_t budget_bytes = uint64_t{1} << 32;  ///< hard: levels, heap and Embree's bytes together, build peaks included
   Blend blend = Blend::Dissolve;
+  float blend_window = 1.0f;  ///< octaves before a coarser level in which it blends with the finer one; in (0, 1]
   Residency residency = Residency::Wait;
   float pixel_error = 1.0f;            ///< pixels: how wide the voxels of a level may look; the budget aside. > 0
   std::optional<float> forced_lambda;  ///< every ray sees this lambda, whatever its footprint; for evaluation
@@ -101,7 +104,9 @@ struct PlanSummary {
   uint64_t planned_bytes = 0;  ///< if everything the plan allows were loaded, build peak included; <= the budget
   double bias = 0;             ///< pixel-weighted mean of how many levels coarser than asked; 0: nothing given up
   std::vector<float> levels_given_up;  ///< per asset: how many levels coarser than its finest instances ask
-  uint64_t asked_bytes = 0;            ///< a budget that gives nothing up in this frame
+  uint64_t asked_bytes = 0;            ///< a budget that gives nothing up in this frame; without morphs
+  uint32_t morphs = 0;                 ///< pairs of levels that morph
+  uint32_t morphs_given_up = 0;        ///< pairs that instances would see morph if they fit; they dissolve
 };
 
 /// Counters since create(). Thread-safe snapshot.

@@ -135,7 +135,7 @@ Counts compare_with_flattened(const LevelData& level, int instance_count, uint64
   }
   const EmbreeSceneRef scene = stage.scene();
   const EmbreeGeometry mesh = flatten(stage.host_device(), level, transforms);
-  const EmbreeScene plain = build_static_scene(stage.host_device(), mesh.get());
+  const EmbreeScene plain = build_static_scene(stage.host_device(), mesh);
 
   Counts counts;
   for (int i = 0; i < 20000; ++i) {

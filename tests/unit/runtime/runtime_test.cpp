@@ -7,11 +7,14 @@
 #include <chrono>
 #include <fstream>
 #include <limits>
+#include <set>
 #include <thread>
 
 #include "base/parallel.h"
 #include "base/vec.h"
+#include "bvh/level_scene.h"
 #include "cache/manifest.h"
+#include "tests/support/asset_writer.h"
 #include "tests/support/files.h"
 #include "tests/support/level_builder.h"
 #include "tests/support/random_unit.h"
@@ -38,6 +41,7 @@ class RuntimeTest : public ::testing::Test {
     delete folder_;
     folder_ = nullptr;
   }
+  static std::filesystem::path path_of(const std::string& name) { return folder_->path() / name; }
   static std::filesystem::path sphere() { return folder_->path() / "sphere.farfield"; }
   /// A copy that a test may break.
   static std::filesystem::path copy(const char* name) {
@@ -992,6 +996,195 @@ TEST_F(RuntimeTest, RaysThatLeaveASurfaceDoNotMeetItAgain) {
     EXPECT_GT(rays, 500);
     EXPECT_EQ(self_hits, 0) << "transform " << i << " size " << size << " at " << far;
   }
+}
+
+// --- Morphs ----------------------------------------------------------------------------------------------------------
+
+/// A sphere of radius 1 that swells by a tenth, then becomes fog: levels 0, 1, 2.
+std::vector<LevelData> swelling_sphere() {
+  std::vector<LevelData> levels = {test::sphere_level(vec3(0), 1.0f, 48, 0, 0.1f),
+                                   test::sphere_level(vec3(0), 1.1f, 48, 1, 0.2f), test::empty_level(2, 0.4f)};
+  for (uint32_t v = 0; v < levels[0].positions.size(); ++v) levels[1].morph_vertex.push_back(v);
+  for (uint32_t f = 0; f < face_count(view_of(levels[0])); ++f) levels[1].morph_face.push_back(f);
+  levels[2].morph_vertex.assign(levels[1].positions.size(), kMorphVoxelized);
+  levels[2].morph_face.assign(face_count(view_of(levels[1])), kMorphVoxelized);
+  test::set_volume(levels[2], ivec3(1), vec3(-1.6f),
+                   [](int x, int y, int z) { return glm::length(vec3(x, y, z) - 3.5f) < 3.0f ? 2.0f : 0.0f; });
+  test::set_diffuse(levels[0], vec3(0.8f, 0.2f, 0.2f));
+  test::set_diffuse(levels[1], vec3(0.2f, 0.2f, 0.8f));
+  test::set_diffuse(levels[2], vec3(0.2f, 0.2f, 0.8f));
+  return levels;
+}
+
+RuntimeOptions morphing(float lambda) {
+  RuntimeOptions options = with_lambda(lambda);
+  options.blend = Blend::Morph;
+  return options;
+}
+
+/// Its asset.
+std::filesystem::path write_swelling_sphere(const std::filesystem::path& folder) {
+  if (!std::filesystem::exists(folder)) write_asset(folder, swelling_sphere());
+  return folder;
+}
+
+TEST_F(RuntimeTest, AMorphLiesBetweenItsLevels) {
+  const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
+  for (const float t : {0.25f, 0.5f, 0.9f}) {
+    Host host(morphing(t));
+    host.add(asset);
+    EXPECT_EQ(host.plan().morphs, 1u);
+    RayContext context;
+    EmbreeRayHit hit;
+    ASSERT_TRUE(host.trace({0.01f, 0.02f, 10}, {0, 0, -1}, context, hit));
+    EXPECT_NEAR(hit.ray.tfar, 9 - 0.1f * t, 3e-3f);  // facets
+    EXPECT_EQ(context.hit.blend, t);
+    const Interaction interaction = host.interaction(hit, context);
+    EXPECT_EQ(interaction.kind, Interaction::Kind::Surface);
+    EXPECT_NEAR(interaction.albedo.x, 0.8f - 0.6f * t, 0.01f);  // colours are bytes
+    EXPECT_NEAR(interaction.albedo.z, 0.2f + 0.6f * t, 0.01f);
+    EXPECT_GT(interaction.shading_normal.z, 0.99f);
+    EXPECT_TRUE(host.messages.empty());
+  }
+}
+
+TEST_F(RuntimeTest, MorphsAreTheLevelsThemselvesAtTheirEnds) {
+  const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
+  for (const float lambda : {0.0f, 1.0f, 2.0f}) {
+    Host still(with_lambda(lambda)), moving(morphing(lambda));
+    for (Host* host : {&still, &moving}) {
+      host->add(asset);
+      host->plan();
+    }
+    EXPECT_EQ(test::hash_of_hits(still), test::hash_of_hits(moving)) << lambda;
+  }
+}
+
+TEST_F(RuntimeTest, AMorphIsTheSameForAnyNumberOfThreadsColdAndWarm) {
+  const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
+  for (const float lambda : {0.5f, 1.5f}) {
+    std::set<uint64_t> hashes;
+    for (const int threads : {1, 2, 16}) {
+      const ThreadLimit limit(threads);
+      Host host(morphing(lambda));
+      host.add(asset);
+      host.plan();
+      hashes.insert(test::hash_of_hits(host));
+      host.runtime().prefetch();
+      hashes.insert(test::hash_of_hits(host));
+      EXPECT_EQ(host.runtime().stats().fallbacks, 0u);
+    }
+    EXPECT_EQ(hashes.size(), 1u) << lambda;
+  }
+}
+
+TEST_F(RuntimeTest, RaysThatLeaveAMorphSeeTheSameOne) {
+  const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
+  Host host(morphing(0.5f));
+  host.add(asset);
+  host.plan();
+  Rng rng(7);
+  int self_hits = 0;
+  for (int k = 0; k < 2000; ++k) {
+    const vec3 direction = test::random_unit(rng);
+    RayContext context;
+    EmbreeRayHit hit;
+    ASSERT_TRUE(host.trace(-4.0f * direction, direction, context, hit));
+    const Interaction interaction = host.interaction(hit, context);
+    vec3 wi = test::random_unit(rng);
+    if (glm::dot(wi, interaction.geometric_normal) < 0.0f) wi = -wi;
+    RayContext next;
+    next.set_origin(context.hit);
+    EXPECT_EQ(next.origin_blend, 0.5f);
+    self_hits += host.trace(interaction.ray_origin(wi), wi, next, hit);
+  }
+  EXPECT_EQ(self_hits, 0);
+}
+
+TEST_F(RuntimeTest, WhereAMorphDoesNotFitItsLevelsDissolve) {
+  const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
+  Host wide(morphing(0.5f));
+  wide.add(asset);
+  const PlanSummary all = wide.plan();
+  EXPECT_EQ(all.morphs, 1u);
+
+  RuntimeOptions options = morphing(0.5f);
+  options.budget_bytes = all.planned_bytes - 1;
+  Host tight(options);
+  tight.add(asset);
+  const PlanSummary less = tight.plan();
+  EXPECT_EQ(less.morphs, 0u);
+  EXPECT_EQ(less.morphs_given_up, 1u);
+  EXPECT_EQ(less.finest_level, all.finest_level);
+  test::hash_of_hits(tight);
+  EXPECT_LE(tight.runtime().stats().peak_accounted_bytes, options.budget_bytes);
+
+  RuntimeOptions dissolving = options;
+  dissolving.blend = Blend::Dissolve;
+  Host plain(dissolving);
+  plain.add(asset);
+  plain.plan();
+  EXPECT_EQ(test::hash_of_hits(plain), test::hash_of_hits(tight));
+
+  RuntimeOptions enough = options;
+  enough.budget_bytes = all.planned_bytes;
+  Host exact(enough);
+  exact.add(asset);
+  EXPECT_EQ(exact.plan().morphs, 1u);
+  EXPECT_EQ(test::hash_of_hits(exact), test::hash_of_hits(wide));
+  EXPECT_LE(exact.runtime().stats().peak_accounted_bytes, enough.budget_bytes);
+  EXPECT_TRUE(exact.messages.empty());
+}
+
+TEST_F(RuntimeTest, LevelsBlendOverTheWindow) {
+  const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
+  for (const auto& [lambda, blend] : {std::pair(0.7f, 0.0f), {0.75f, 0.0f}, {0.875f, 0.5f}}) {
+    RuntimeOptions options = morphing(lambda);
+    options.blend_window = 0.25f;
+    Host host(options);
+    host.add(asset);
+    host.plan();
+    RayContext context;
+    EmbreeRayHit hit;
+    ASSERT_TRUE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));
+    EXPECT_EQ(context.hit.blend, blend) << lambda;
+  }
+  const EmbreeDevice device = std::move(*make_embree_device());
+  for (const float window : {0.0f, -1.0f, 1.5f, std::numeric_limits<float>::quiet_NaN()}) {
+    RuntimeOptions options;
+    options.blend_window = window;
+    EXPECT_FALSE(Runtime::create(device.get(), options)) << window;
+  }
+}
+
+TEST_F(RuntimeTest, AssetsWithoutMeasuredMorphsDissolveAndSaySo) {
+  const std::filesystem::path asset = path_of("old");
+  const auto measure = [](const LevelView& level) { return *measure_level_scene(level); };
+  test::write_asset(asset, swelling_sphere(), measure);
+  Host host(morphing(0.5f));
+  host.add(asset);
+  EXPECT_EQ(host.plan().morphs, 0u);
+  ASSERT_EQ(host.messages.size(), 1u);
+  EXPECT_NE(host.messages[0].find("dissolve"), std::string::npos) << host.messages[0];
+}
+
+TEST_F(RuntimeTest, AFrameInProgressGoesOnWithOneOfTheLevelsUntilTheMorphIsThere) {
+  const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
+  RuntimeOptions options = morphing(0.5f);
+  options.residency = Residency::Progressive;
+  Host host(options);
+  host.add(asset);
+  host.plan();
+  RayContext context;
+  EmbreeRayHit hit;
+  ASSERT_TRUE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));
+  EXPECT_EQ(context.hit.blend, 0.0f);
+  EXPECT_GT(host.runtime().stats().fallbacks, 0u);
+  for (int i = 0; i < 5000 && context.hit.blend == 0.0f; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    host.trace({0, 0, 10}, {0, 0, -1}, context, hit);
+  }
+  EXPECT_EQ(context.hit.blend, 0.5f);
 }
 
 TEST_F(RuntimeTest, ConesWidenWithTheLobe) {
