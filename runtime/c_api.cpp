@@ -262,6 +262,10 @@ void ff_set_origin(FfRayContext* context, const FfRayContext* from) {
   context_in(*context).set_origin(context_in(*from).hit);
 }
 
+void ff_measure_transmittance(FfRayContext* context) { context_in(*context).transmittance = 1; }
+
+float ff_transmittance(const FfRayContext* context) { return context_in(*context).transmittance; }
+
 void ff_clear_origin(FfRayContext* context) { context_in(*context).set_origin(HitRecord()); }
 
 FfStatus ff_interaction(const FfRuntime* runtime, const RTCRayHit* ray_hit, const FfRayContext* context,

@@ -138,6 +138,10 @@ typedef struct FfRayContext {
 FF_API void ff_ray_context_init(FfRayContext* context);
 /* The ray starts at the hit of `from`, which may be the same context. */
 FF_API void ff_set_origin(FfRayContext* context, const FfRayContext* from);
+/* The next occlusion query with this context passes volumes, and ff_transmittance() is the share of light that they let
+   through; RayContext::transmittance. */
+FF_API void ff_measure_transmittance(FfRayContext* context);
+FF_API float ff_transmittance(const FfRayContext* context);
 /* The ray starts elsewhere. */
 FF_API void ff_clear_origin(FfRayContext* context);
 
