@@ -217,31 +217,58 @@ bool BrickVolume::skim_brick(Flight& flight, const Brick& brick, const ivec3& br
   }
 }
 
-std::optional<VolumeHit> BrickVolume::first_collision(const LocalRay& ray, uint64_t seed, float share) const {
-  if (is_empty()) return std::nullopt;
+/// The part of a ray that may meet something; in voxels, s = 0 at range.t_near.
+struct BrickVolume::Course {
+  RayRange range;
+  vec3 entry;      ///< where s = 0
+  vec3 direction;  ///< per unit of t
+  float speed;     ///< scene units per unit of t
+  float s_end;
+
+  vec3 inverse() const { return 1.0f / direction; }
+  ivec3 sign() const {
+    const auto of = [](float x) { return x > 0.0f ? 1 : -1; };
+    return {of(direction.x), of(direction.y), of(direction.z)};
+  }
+  /// s between planes.
+  static vec3 delta(const vec3& inverse) {
+    return {std::abs(inverse.x), std::abs(inverse.y), std::abs(inverse.z)};  // glm::abs branches
+  }
+};
+
+/// False: there is none.
+inline bool BrickVolume::find_course(const LocalRay& ray, Course& course) const {
+  if (is_empty()) return false;
   const LocalRay in_voxels{(ray.origin - origin_) * inverse_voxel_size_, ray.direction * inverse_voxel_size_,
                            ray.t_near, ray.t_far};
-  if (!is_traceable(in_voxels)) return std::nullopt;
+  if (!is_traceable(in_voxels)) return false;
   const RayRange range = clip_to_box(in_voxels, occupied_);
-  if (range.is_empty() || !std::isfinite(range.t_far)) return std::nullopt;  // an infinite range has no direction
+  if (range.is_empty() || !std::isfinite(range.t_far)) return false;  // an infinite range has no direction
 
   const float speed = glm::length(ray.direction);
-  if (!(speed > 0.0f && speed < kInfinity)) return std::nullopt;
+  if (!(speed > 0.0f && speed < kInfinity)) return false;
+  course = {range, in_voxels.origin + range.t_near * in_voxels.direction, in_voxels.direction, speed,
+            range.t_far - range.t_near};
+  return true;
+}
+
+std::optional<VolumeHit> BrickVolume::first_collision(const LocalRay& ray, uint64_t seed, float share) const {
+  Course course;
+  if (!find_course(ray, course)) return std::nullopt;
   FlightRandom random(seed, share);
   const float depth = random.optical_depth();
-  const float s_end = range.t_far - range.t_near, bound = attenuation_bound() * speed;
+  const RayRange& range = course.range;
+  const float s_end = course.s_end, bound = attenuation_bound() * course.speed;
   if (densest_scale_ * bound * s_end < depth) return std::nullopt;
 
-  const vec3& d = in_voxels.direction;
-  const vec3 inverse = 1.0f / d;
-  const auto sign = [](float x) { return x > 0.0f ? 1 : -1; };
-  Flight flight{in_voxels.origin + range.t_near * d,
-                d,
+  const vec3 inverse = course.inverse();
+  Flight flight{course.entry,
+                course.direction,
                 inverse,
-                {sign(d.x), sign(d.y), sign(d.z)},
-                {std::abs(inverse.x), std::abs(inverse.y), std::abs(inverse.z)},  // glm::abs branches
-                ray.direction / speed,
-                speed,
+                course.sign(),
+                Course::delta(inverse),
+                ray.direction / course.speed,
+                course.speed,
                 depth,
                 random};
   const vec3 brick_delta = flight.delta * static_cast<float>(kBrickSide);
@@ -259,6 +286,51 @@ std::optional<VolumeHit> BrickVolume::first_collision(const LocalRay& ray, uint6
       if (hits) return VolumeHit{std::min(range.t_near + flight.s_hit, range.t_far), flight.payload_hit};
     }
     if (s_next >= s_end || !walk.step(flight.sign, brick_delta, brick_dims_)) return std::nullopt;
+    s = std::max(s, s_next);
+  }
+}
+
+float BrickVolume::depth_of_brick(const Course& course, const Brick& brick, const ivec3& brick_cell, float s_begin,
+                                  float s_end) const {
+  static const ivec3 kSide(kBrickSide);
+  const vec3 corner = vec3(brick_cell * kBrickSide), inverse = course.inverse(), delta = Course::delta(inverse);
+  const vec3 unit_direction = glm::normalize(course.direction);
+  const float rate_per_density = brick.density_scale * (1.0f / 255.0f) * course.speed;
+  const ivec3 sign = course.sign();
+  float sum = 0;
+  Walk walk(course.entry, course.direction, inverse, corner, 1.0f, s_begin, kSide);
+  for (float s = s_begin;;) {
+    const float s_next = std::min(walk.exit(), s_end);
+    const int voxel = walk.cell.x + kBrickSide * (walk.cell.y + kBrickSide * walk.cell.z);
+    const uint8_t density = brick.density[static_cast<size_t>(voxel)];
+    if (density != 0 && s_next > s) {
+      const uint32_t payload = brick.payload_index(voxel);
+      const PackedOctants octants = octants_of(payload);
+      float length = 0;  // of it in full octants
+      walk_octants(course.entry - corner, course.direction, inverse, walk.cell, s, s_next,
+                   [&](int octant, float enter, float leave) {
+                     length += octant_share(octants, octant) * (leave - enter);
+                     return true;
+                   });
+      sum += static_cast<float>(density) * rate_per_density * projected_area(payload, unit_direction) * length;
+    }
+    if (s_next >= s_end || !walk.step(sign, delta, kSide)) return sum;
+    s = std::max(s, s_next);
+  }
+}
+
+float BrickVolume::optical_depth(const LocalRay& ray) const {
+  Course course;
+  if (!find_course(ray, course)) return 0;
+  const vec3 inverse = course.inverse(), brick_delta = Course::delta(inverse) * static_cast<float>(kBrickSide);
+  const ivec3 sign = course.sign();
+  float sum = 0;
+  Walk walk(course.entry, course.direction, inverse, vec3(0.0f), static_cast<float>(kBrickSide), 0.0f, brick_dims_);
+  for (float s = 0.0f;;) {
+    const float s_next = std::min(walk.exit(), course.s_end);
+    const uint32_t index = brick_table_[brick_table_index(brick_dims_, walk.cell)];
+    if (index != kNoBrick && s_next > s) sum += depth_of_brick(course, bricks_[index], walk.cell, s, s_next);
+    if (s_next >= course.s_end || !walk.step(sign, brick_delta, brick_dims_)) return sum;
     s = std::max(s, s_next);
   }
 }

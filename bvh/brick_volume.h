@@ -71,9 +71,16 @@ class BrickVolume {
   /// t_far beyond it. Zero direction, NaN or infinite origins: none. share, in (0, 1]: of the flakes that are there;
   /// all densities are so much lower.
   std::optional<VolumeHit> first_collision(const LocalRay& ray, uint64_t seed, float share = 1) const;
+  /// That integral over [t_near, t_far], up to rounding: exp(-optical_depth) of the light passes. 0 where there is no
+  /// collision.
+  float optical_depth(const LocalRay& ray) const;
 
  private:
   struct Flight;
+  struct Course;
+  [[gnu::always_inline]] bool find_course(const LocalRay& ray, Course& course) const;  // a call costs rays 5 %
+  float depth_of_brick(const Course& course, const Brick& brick, const ivec3& brick_cell, float s_begin,
+                       float s_end) const;
   void find_what_is_occupied(const LevelView& level);
   /// What sigma_t is at most for a density of 1 / scene unit.
   float attenuation_bound() const;

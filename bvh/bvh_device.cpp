@@ -27,13 +27,12 @@ bool BvhDevice::on_memory(void* self, ssize_t bytes, bool /*post*/) {
 }
 
 void BvhDevice::set_limit(uint64_t bytes) {
-  is_limit_exceeded_.store(false, std::memory_order_relaxed);
   limit_bytes_.store(static_cast<int64_t>(std::min<uint64_t>(bytes, kNoLimit)), std::memory_order_relaxed);
 }
 
 bool BvhDevice::end_limit() {
   limit_bytes_.store(kNoLimit, std::memory_order_relaxed);
-  return is_limit_exceeded_.load(std::memory_order_relaxed);
+  return is_limit_exceeded_.exchange(false, std::memory_order_relaxed);
 }
 
 Result<std::unique_ptr<BvhDevice>> BvhDevice::create() {

@@ -38,7 +38,7 @@ class BvhDevice {
   /// Embree gets no memory that would take bytes() above this: the build in progress then fails. For builds, under
   /// build_mutex().
   void set_limit(uint64_t bytes);
-  /// Takes the limit away. True: Embree has asked for more than it allowed.
+  /// Takes the limit away. True: Embree has asked for more than one of the limits since the last call.
   bool end_limit();
 
  private:
@@ -54,6 +54,9 @@ class BvhDevice {
   std::atomic<bool> is_limit_exceeded_{false};
   EmbreeDevice device_;  // last, so released first: what it gives back is still counted
 };
+
+/// As much memory as there is.
+inline constexpr uint64_t kAnyBytes = std::numeric_limits<uint64_t>::max();
 
 /// What Embree does not report: scene objects, geometry objects and malloc's rounding, measured on 3.13.5.
 inline constexpr uint64_t kSceneOverheadBytes = 3072;

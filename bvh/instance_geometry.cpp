@@ -245,19 +245,25 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
   return true;
 }
 
-bool InstanceGeometry::occluded(uint32_t instance, EmbreeRay& ray, const RayContext& context,
+bool InstanceGeometry::occluded(uint32_t instance, EmbreeRay& ray, RayContext& context,
                                 EmbreeContext* embree_context) const {
   Visit visit;
   if (!enter(instance, ray, context, visit)) return false;
+  float* const transmittance = context.transmittance >= 0.0f ? &context.transmittance : nullptr;
   if (visit.morph) {
     const InLocalSpace scope(ray, visit.ray);
-    return visit.morph->occluded(ray, *embree_context, visit.choice.blend, bits_of_ray(context, instance));
+    return visit.morph->occluded(ray, *embree_context, visit.choice.blend, bits_of_ray(context, instance),
+                                 transmittance);
   }
   if (visit.level->scene.handle()) {
     const InLocalSpace scope(ray, visit.ray);
     if (trace_occlusion(visit.level->scene.handle(), *embree_context, ray)) return true;
   }
   const BrickVolume& volume = visit.level->volume;
+  if (transmittance) {
+    *transmittance *= std::exp(-volume.optical_depth(visit.ray));
+    return false;
+  }
   if (volume.is_empty() ||
       !volume.first_collision(visit.ray, flight_seed(bits_of_ray(context, instance), visit.level->slot)))
     return false;
@@ -311,11 +317,15 @@ struct InstanceGeometry::Query {
 
 namespace {
 
+uint32_t mark_of(const EmbreeContext& context) {
+  uint32_t mark;
+  std::memcpy(&mark, &context.flags, sizeof mark);
+  return mark & ~uint32_t{RTC_INTERSECT_CONTEXT_FLAG_COHERENT};
+}
+
 /// The RayContext of a ray, whatever the host has passed; `fallback` if that has none.
 RayContext& context_of(EmbreeContext& given, const EmbreeRay& ray, std::optional<RayContext>& fallback) {
-  uint32_t mark;
-  std::memcpy(&mark, &given.flags, sizeof mark);
-  mark &= ~uint32_t{RTC_INTERSECT_CONTEXT_FLAG_COHERENT};
+  const uint32_t mark = mark_of(given);
   if (mark == detail::kRayContextMark) return reinterpret_cast<RayContext&>(given);
   if (mark == detail::kRayContextsMark) {
     auto& all = reinterpret_cast<RayContexts&>(given);
@@ -378,8 +388,29 @@ bool InstanceGeometry::intersect_filtered(const Query& query, EmbreeRayHit& ray_
   return is_accepted;
 }
 
+/// Single rays with a RayContext and without filters: nothing else is asked for, and nothing else is in their way.
+bool InstanceGeometry::is_plain(unsigned ray_count, const EmbreeContext& context) const {
+  return ray_count == 1 && mark_of(context) == detail::kRayContextMark && !context.filter && !has_filters;
+}
+
 void InstanceGeometry::intersect_callback(const RTCIntersectFunctionNArguments* args) {
   const auto& self = *static_cast<const InstanceGeometry*>(args->geometryUserPtr);
+  if (!self.is_plain(args->N, *args->context)) return self.intersect_others(args);
+  if (args->valid[0] == 0) return;
+  auto& context = *reinterpret_cast<RayContext*>(args->context);
+  auto& ray_hit = *reinterpret_cast<EmbreeRayHit*>(args->rayhit);
+  self.intersect(args->primID, args->geomID, ray_hit, context, args->context, &context.hit);
+}
+
+void InstanceGeometry::occluded_callback(const RTCOccludedFunctionNArguments* args) {
+  const auto& self = *static_cast<const InstanceGeometry*>(args->geometryUserPtr);
+  if (!self.is_plain(args->N, *args->context)) return self.occlude_others(args);
+  if (args->valid[0] == 0) return;
+  auto& context = *reinterpret_cast<RayContext*>(args->context);
+  self.occluded(args->primID, *reinterpret_cast<EmbreeRay*>(args->ray), context, args->context);
+}
+
+void InstanceGeometry::intersect_others(const RTCIntersectFunctionNArguments* args) const {
   const auto intersect_one = [&](EmbreeRayHit& ray_hit, bool is_single) {
     std::optional<RayContext> fallback;
     RayContext& context = context_of(*args->context, ray_hit.ray, fallback);
@@ -388,10 +419,10 @@ void InstanceGeometry::intersect_callback(const RTCIntersectFunctionNArguments* 
                       args->context,
                       args->primID,
                       args->geomID,
-                      self.has_filters || args->context->filter,
+                      has_filters || args->context->filter,
                       ask_intersection_filters,
                       args};
-    return self.intersect_filtered(query, ray_hit, has_own ? &context.hit : nullptr);
+    return intersect_filtered(query, ray_hit, has_own ? &context.hit : nullptr);
   };
   if (args->N == 1) {
     if (args->valid[0] != 0) intersect_one(*reinterpret_cast<EmbreeRayHit*>(args->rayhit), true);
@@ -411,20 +442,17 @@ void InstanceGeometry::intersect_callback(const RTCIntersectFunctionNArguments* 
   }
 }
 
-void InstanceGeometry::occluded_callback(const RTCOccludedFunctionNArguments* args) {
-  const auto& self = *static_cast<const InstanceGeometry*>(args->geometryUserPtr);
+void InstanceGeometry::occlude_others(const RTCOccludedFunctionNArguments* args) const {
   const auto is_occluded = [&](EmbreeRay& ray) {
     std::optional<RayContext> fallback;
     RayContext& context = context_of(*args->context, ray, fallback);
-    if (!self.has_filters && !args->context->filter) {
-      return self.occluded(args->primID, ray, context, &context.embree);
-    }
+    if (!has_filters && !args->context->filter) return occluded(args->primID, ray, context, &context.embree);
     EmbreeRayHit ray_hit;  // filters want to know the hit
     ray_hit.ray = ray;
     ray_hit.hit.geomID = kNoGeometry;
     ray_hit.hit.instID[0] = args->context->instID[0];
     const Query query{context, args->context, args->primID, args->geomID, true, ask_occlusion_filters, args};
-    return self.intersect_filtered(query, ray_hit, nullptr);
+    return intersect_filtered(query, ray_hit, nullptr);
   };
   if (args->N == 1) {
     auto& ray = *reinterpret_cast<EmbreeRay*>(args->ray);

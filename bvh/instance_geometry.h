@@ -74,16 +74,20 @@ class InstanceGeometry {
   static void occluded_callback(const RTCOccludedFunctionNArguments* args);
 
   struct Visit;
+  struct Query;
+  bool is_plain(unsigned ray_count, const EmbreeContext& context) const;
+  // Not inlined: their frames would be in the way of plain rays.
+  [[gnu::noinline]] void intersect_others(const RTCIntersectFunctionNArguments* args) const;
+  [[gnu::noinline]] void occlude_others(const RTCOccludedFunctionNArguments* args) const;
+  bool intersect_filtered(const Query& query, EmbreeRayHit& ray_hit, HitRecord* record) const;
   static bool intersect_level(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
                               EmbreeContext& embree_context, HitRecord& made);
   static bool intersect_morph(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
                               EmbreeContext& embree_context, HitRecord& made);
-  struct Query;
-  bool intersect_filtered(const Query& query, EmbreeRayHit& ray_hit, HitRecord* record) const;
   bool enter(uint32_t instance, const EmbreeRay& ray, const RayContext& context, Visit& visit) const;
   bool intersect(uint32_t instance, unsigned geometry_id, EmbreeRayHit& ray_hit, const RayContext& context,
                  EmbreeContext* embree_context, HitRecord* record) const;
-  bool occluded(uint32_t instance, EmbreeRay& ray, const RayContext& context, EmbreeContext* embree_context) const;
+  bool occluded(uint32_t instance, EmbreeRay& ray, RayContext& context, EmbreeContext* embree_context) const;
 
   LevelSource& source_;
 };

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "bvh/see_through.h"
@@ -311,10 +312,17 @@ std::optional<MorphHit> TracedMorph::intersect(EmbreeRayHit& ray_hit, EmbreeCont
   return result;
 }
 
-bool TracedMorph::occluded(EmbreeRay& ray, EmbreeContext& context, float t, uint64_t ray_bits) const {
+bool TracedMorph::occluded(EmbreeRay& ray, EmbreeContext& context, float t, uint64_t ray_bits,
+                           float* transmittance) const {
   if (built_.scene) {
     const AtTime scope(ray, t);
     if (trace_occlusion(built_.scene.get(), context, ray)) return true;
+  }
+  if (transmittance) {
+    const LocalRay local = local_ray(ray);
+    *transmittance *=
+        std::exp(-(1 - t) * fine_->volume.optical_depth(local) - t * coarse_->volume.optical_depth(local));
+    return false;
   }
   bool is_coarser = false;
   if (!first_collision(local_ray(ray), t, ray_bits, is_coarser)) return false;

@@ -45,7 +45,9 @@ class TracedMorph {
   /// for geomID and primID. ray_bits: see flight_seed().
   std::optional<MorphHit> intersect(EmbreeRayHit& ray_hit, EmbreeContext& context, float t, uint64_t ray_bits) const;
   /// Whether there is any hit; the ray's tfar is -infinity then.
-  bool occluded(EmbreeRay& ray, EmbreeContext& context, float t, uint64_t ray_bits) const;
+  /// transmittance: null, or what takes the share of light that the volumes let through, instead of their collisions.
+  bool occluded(EmbreeRay& ray, EmbreeContext& context, float t, uint64_t ray_bits,
+                float* transmittance = nullptr) const;
 
   /// What the BVH and the tables hold, and what else making them from the files of these levels takes.
   LevelCost cost(const LevelView& fine_level, const LevelView& coarse_level) const;

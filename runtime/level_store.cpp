@@ -164,12 +164,14 @@ Result<void> LevelStore::set_instance_bytes(uint64_t bytes) {
   return {};
 }
 
-Result<uint64_t> LevelStore::least_bytes(std::span<const std::filesystem::path> folders, uint64_t instance_bytes) {
+Result<uint64_t> LevelStore::least_bytes(std::span<const std::filesystem::path> folders, Blend blend,
+                                         uint64_t instance_bytes) {
   Messages silent({});
   TextureCache textures(silent);
   uint64_t bytes = kRuntimeBytes + instance_bytes, largest_peak = 0;
   for (const std::filesystem::path& folder : folders) {
     FARFIELD_TRY_LET(const auto asset, read_asset(folder, {}, textures));
+    if (blend == Blend::Morph) asset->morph_items.resize(asset->levels.size());  // as add_items() does
     bytes += asset->table_bytes() + asset->levels.back().resident_bytes;
     largest_peak = std::max(largest_peak, asset->build_peak_bytes.back());
   }

@@ -44,7 +44,8 @@ class LevelStore final : public LevelSource {
   /// What the budget pays for besides levels and textures.
   uint64_t fixed_bytes() const;
   /// A budget for these (canonical) folders and instances that take so many bytes. Errors: those of read_asset.
-  static Result<uint64_t> least_bytes(std::span<const std::filesystem::path> folders, uint64_t instance_bytes);
+  static Result<uint64_t> least_bytes(std::span<const std::filesystem::path> folders, Blend blend,
+                                      uint64_t instance_bytes);
 
   /// What the cache of textures wants if the plan shows textured sources up close; 0 if it does not.
   uint64_t wanted_texture_bytes(const Plan& plan) const;

@@ -141,7 +141,7 @@ Result<uint64_t> Runtime::least_budget(const std::vector<std::string>& folders, 
     FARFIELD_TRY_LET(auto canonical, canonical_folder(folder));
     each_once.insert(std::move(canonical));
   }
-  return LevelStore::least_bytes(std::vector(each_once.begin(), each_once.end()),
+  return LevelStore::least_bytes(std::vector(each_once.begin(), each_once.end()), options.blend,
                                  instance_count * bytes_per_instance(options));
 }
 

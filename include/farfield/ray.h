@@ -64,6 +64,12 @@ struct RayContext {
   uint8_t origin_level_slot = 0;
   float origin_blend = 0;
 
+  // In and out of occlusion queries, unless a filter of the host's is asked. Negative: volumes stop the ray with the
+  // probability that they stop light. Else the ray passes volumes, and this is multiplied by the share of light that
+  // they let through, without noise and for about the cost of a few such rays. Set it to 1 before each query; what the
+  // query calls occluded, a surface has stopped.
+  float transmittance = -1;
+
   // Out: valid after rtcIntersect1 if and only if ray_hit.hit.geomID is Runtime::geometry_id().
   HitRecord hit;
 

@@ -515,6 +515,11 @@ TEST(InstanceGeometry, VolumesKeepTheirTransmittanceUnderAnyAffineTransform) {
       }
     }
     const double expected = std::exp(-depth);
+    RayContext measuring;
+    measuring.transmittance = 0.5f;
+    EmbreeRay through = make_ray(origin, direction);
+    EXPECT_FALSE(trace_occlusion(scene, measuring.embree, through));
+    EXPECT_NEAR(measuring.transmittance, 0.5 * expected, 1e-3 * expected) << i;
     EXPECT_NEAR(passed / double(kRays), expected, 4.5 * std::sqrt(expected * (1 - expected) / kRays)) << i;
   }
 }

@@ -152,6 +152,11 @@ TEST(TracedMorph, OfEitherVolumeAShareIsThere) {
     }
     const double sum = (1 - t) * a + t * b, expected = 1 - std::exp(-sum * 4);                 // four units of fog
     EXPECT_NEAR(hits / double(kRays), expected, 4 * std::sqrt(expected / kRays) + 2e-3) << t;  // densities are bytes
+    EmbreeRay shadow = make_ray({1.2f, 1.7f, 9}, kDown);
+    RayContext context;
+    float transmittance = 1;
+    EXPECT_FALSE((*morph).occluded(shadow, context.embree, t, 1, &transmittance));
+    EXPECT_NEAR(transmittance, 1 - expected, 2e-3) << t;
     EXPECT_NEAR(of_coarser / double(hits), t * b / sum, 4 * std::sqrt(0.25 / hits)) << t;
   }
 }

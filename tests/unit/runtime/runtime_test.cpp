@@ -64,6 +64,18 @@ void flip_byte(const std::filesystem::path& file, uint64_t offset) {
   stream.put(byte);
 }
 
+/// The number of bytes that an OutOfBudget error says would do: the largest in it.
+uint64_t number_in(const std::string& message) {
+  uint64_t largest = 0;
+  for (size_t i = 0; i < message.size(); ++i) {
+    if (!std::isdigit(message[i])) continue;
+    size_t digits = 0;
+    largest = std::max<uint64_t>(largest, std::stoull(message.substr(i), &digits));
+    i += digits;
+  }
+  return largest;
+}
+
 RuntimeOptions with_budget(uint64_t bytes) {
   RuntimeOptions options;
   options.budget_bytes = bytes;
@@ -167,14 +179,7 @@ TEST_F(RuntimeTest, ABudgetBelowTheRootsIsRefusedWithTheNumberThatWouldDo) {
     const auto asset = host.runtime().open_asset(sphere().string());
     ASSERT_FALSE(asset);
     ASSERT_EQ(asset.error().code, ErrorCode::OutOfBudget);
-    // The message ends in "... N bytes ..."; the largest number in it is the one.
-    for (size_t i = 0; i < asset.error().message.size(); ++i) {
-      if (std::isdigit(asset.error().message[i])) {
-        size_t end = 0;
-        enough = std::max<uint64_t>(enough, std::stoull(asset.error().message.substr(i), &end));
-        i += end;
-      }
-    }
+    enough = number_in(asset.error().message);
   }
   ASSERT_GT(enough, 1000u);
   Host host(with_budget(enough));
@@ -211,7 +216,7 @@ TEST_F(RuntimeTest, ALoadNeverTakesMoreThanTheBudgetHoweverTheManifestLies) {
   hash_of_hits(host);
   EXPECT_LE(host.runtime().stats().peak_accounted_bytes, budget);
   ASSERT_EQ(host.messages.size(), 1u);
-  EXPECT_NE(host.messages[0].find("level_0.ffl: the BVH of"), std::string::npos) << host.messages[0];
+  EXPECT_NE(host.messages[0].find("level_0.ffl: cannot build a BVH of"), std::string::npos) << host.messages[0];
   EXPECT_NE(host.messages[0].find("farfield verify"), std::string::npos) << host.messages[0];
   EXPECT_GT(host.runtime().stats().fallbacks, 0u);
 }
@@ -499,18 +504,6 @@ TEST_F(RuntimeTest, ALevelThatDidNotFitIsLoadedOnceAPlanHasRoom) {
   EXPECT_EQ(level_seen_at(far), 0u);
 }
 
-/// The number of bytes that an OutOfBudget error says would do: the largest in it.
-uint64_t number_in(const std::string& message) {
-  uint64_t largest = 0;
-  for (size_t i = 0; i < message.size(); ++i) {
-    if (!std::isdigit(message[i])) continue;
-    size_t digits = 0;
-    largest = std::max<uint64_t>(largest, std::stoull(message.substr(i), &digits));
-    i += digits;
-  }
-  return largest;
-}
-
 TEST_F(RuntimeTest, AnInstanceThatDoesNotFitIsRefusedAtOnceWithTheNumberThatWouldDo) {
   constexpr uint64_t kBudget = 4 << 20;
   Host host(with_budget(kBudget));
@@ -540,6 +533,20 @@ TEST_F(RuntimeTest, AnInstanceThatDoesNotFitIsRefusedAtOnceWithTheNumberThatWoul
     EXPECT_EQ(other.runtime().add_instance(asset, mat4x3(1.0f)).has_value(), budget == enough);
   }
   EXPECT_EQ(Runtime::least_budget({"/nowhere"}, 1).error().code, ErrorCode::NotFound);
+}
+
+TEST_F(RuntimeTest, TheLeastBudgetIsEnoughForMorphsToo) {
+  RuntimeOptions options;
+  options.blend = Blend::Morph;
+  const uint64_t least = *Runtime::least_budget({sphere().string()}, 1, options);
+  for (const uint64_t budget : {least, least - 1}) {
+    options.budget_bytes = budget;
+    Host host(options);
+    const auto asset = host.runtime().open_asset(sphere().string());
+    const bool fits = asset && host.runtime().add_instance(*asset, mat4x3(1.0f));
+    EXPECT_EQ(fits, budget == least);
+    EXPECT_TRUE(!fits || host.plan().planned_bytes <= least);
+  }
 }
 
 // --- Instances that change -------------------------------------------------------------------------------------------
