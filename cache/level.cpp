@@ -49,6 +49,25 @@ vec3 unpack_color(PackedColor color) {
   return root * root;
 }
 
+PackedAlbedo pack_albedo(const vec3& albedo) {
+  PackedAlbedo packed;
+  for (int i = 0; i < 3; ++i) {
+    const float root = std::sqrt(std::fmin(std::fmax(albedo[i], 0.0f), 1.0f));  // NaN becomes 0
+    packed.angle_rgb[static_cast<size_t>(i)] = to_unorm8(std::asin(root) / (0.5f * kPi));
+  }
+  return packed;
+}
+
+vec3 unpack_albedo(PackedAlbedo albedo) {
+  vec3 result;
+  for (int i = 0; i < 3; ++i) {
+    const uint8_t angle = albedo.angle_rgb[static_cast<size_t>(i)];
+    const float root = std::sin(0.5f * kPi * unpack_unorm8(angle));
+    result[i] = angle == 255 ? 1.0f : root * root;
+  }
+  return result;
+}
+
 PackedVertexColor pack_vertex_color(const vec4& linear_rgba) {
   PackedVertexColor packed;
   for (int i = 0; i < 4; ++i) packed.sqrt_rgba[static_cast<size_t>(i)] = to_unorm8(std::sqrt(linear_rgba[i]));

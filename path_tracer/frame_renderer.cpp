@@ -14,6 +14,7 @@
 #include "base/process_memory.h"
 #include "base/result.h"
 #include "cache/manifest.h"
+#include "import/read_scene.h"
 #include "path_tracer/asset_library.h"
 #include "path_tracer/budget_notice.h"
 #include "path_tracer/film.h"
@@ -146,7 +147,7 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOption
   renderer->options_.warning = [log = renderer->warnings_](const std::string& line) { log->add(line); };
   const RenderOptions& options = renderer->options_;
 
-  FARFIELD_TRY_LET(auto scene, read_gltf_scene(options.scene, options.assemblies));
+  FARFIELD_TRY_LET(auto scene, read_scene(options.scene, {options.assemblies, options.fog}));
   for (const std::string& warning : scene.warnings) options.warning(warning);  // before an error may come
   FARFIELD_TRY_LET(const auto camera, find_camera(scene, options.camera));
   renderer->camera_ = camera;

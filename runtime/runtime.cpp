@@ -26,10 +26,15 @@ Result<void> check_options(const RuntimeOptions& options) {
   return {};
 }
 
-/// M after a translation by `origin`, in double: both may be far from zero and cancel.
-mat4x3 with_origin(const mat4x3& m, const dvec3& origin) {
+/// M after a translation by `origin`, in double: both may be far from zero and cancel. Before that, a rotation.
+mat4x3 with_origin(const mat4x3& m, const dvec3& origin, const glm::dmat3& rotation) {
+  const glm::dmat3 linear{dvec3(m[0]), dvec3(m[1]), dvec3(m[2])};
   mat4x3 result = m;
-  result[3] = vec3(dvec3(m[3]) + glm::dmat3(dvec3(m[0]), dvec3(m[1]), dvec3(m[2])) * origin);
+  if (rotation != glm::dmat3(1.0)) {
+    const glm::dmat3 turned = linear * rotation;
+    result = mat4x3(vec3(turned[0]), vec3(turned[1]), vec3(turned[2]), m[3]);
+  }
+  result[3] = vec3(dvec3(m[3]) + linear * origin);
   return result;
 }
 
@@ -122,8 +127,8 @@ Result<InstanceId> Runtime::add_instance(AssetId asset, const glm::mat4x3& local
   }
   std::vector<InstanceRecord>& instances = impl_->geometry.instances;
   if (instances.size() >= kNoInstance) return make_error(ErrorCode::InvalidArgument, "too many instances");
-  const dvec3& origin = impl_->levels.asset(asset.value).origin;
-  FARFIELD_TRY_LET(auto record, make_instance(asset.value, with_origin(local_to_world, origin)));
+  const OpenAsset& opened = impl_->levels.asset(asset.value);
+  FARFIELD_TRY_LET(auto record, make_instance(asset.value, with_origin(local_to_world, opened.origin, opened.rotation)));
   record.footprint.world_to_r0 = impl_->options.pixel_error / largest_stretch(local_to_world);
   instances.push_back(record);
   if (data != InstanceData()) {
