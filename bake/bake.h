@@ -23,7 +23,7 @@ struct BakeOptions {
   uint32_t finest_grid = 512;       ///< level 1: longest side of the bounds / r_1. A power of two >= coarsest_grid
   uint32_t coarsest_grid = 8;       ///< last level, the root
   uint32_t rays_per_voxel = 200;    ///< thesis 10.1.3
-  Downsampling downsampling = Downsampling::Iso;  ///< of volumes, whose grids and rays the file decides
+  Downsampling downsampling = Downsampling::Matched;  ///< of volumes, whose grids and rays the file decides
   bool source_only = false;         ///< write only level 0 (what --full-detail renders)
   bool even_if_up_to_date = false;  ///< of an asset in memory: its hash does not say all that it depends on
   ImportOptions import;

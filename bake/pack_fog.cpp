@@ -21,6 +21,7 @@ struct PackedFog {
   Brick brick{};
   std::vector<PackedAlbedo> albedo;
   std::vector<uint8_t> self_shadowing;
+  std::vector<int8_t> anisotropy;
   std::vector<PackedFlakeSggx> shape;
 };
 
@@ -50,6 +51,7 @@ PackedFog pack_brick(const FogVoxels& voxels) {
     if (packed.brick.density[i] == 0) continue;
     packed.albedo.push_back(pack_albedo(voxels[i].albedo));
     packed.self_shadowing.push_back(std::max<uint8_t>(pack_unorm8(voxels[i].self_shadowing), 1));
+    packed.anisotropy.push_back(pack_anisotropy(voxels[i].anisotropy));
     packed.shape.push_back(pack_flake_sggx(voxels[i].shape));
   }
   return packed;
@@ -67,7 +69,7 @@ void drop_if_all(std::vector<T>& values, const T& default_value) {
 
 /// Which channels a level's voxels may have at all.
 struct FogChannels {
-  bool albedo = false, self_shadowing = false, shape = false;
+  bool albedo = false, self_shadowing = false, shape = false, anisotropy = false;
 };
 
 /// Makes a level from its bricks. voxels_of(brick, voxels): false where the brick is empty; called from many threads.
@@ -107,12 +109,14 @@ Result<LevelData> pack_bricks(const SourceVolume& source, const ivec3& dims, dou
       level.bricks.push_back(packed.brick);
       if (channels.albedo) append(level.voxel_albedo, packed.albedo);
       if (channels.self_shadowing) append(level.voxel_self_shadowing, packed.self_shadowing);
+      if (channels.anisotropy) append(level.voxel_anisotropy, packed.anisotropy);
       if (channels.shape) append(level.voxel_sggx, packed.shape);
     }
   }
   if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, "bake: cancelled");
   drop_if_all(level.voxel_albedo, pack_albedo(source.albedo));
   drop_if_all(level.voxel_self_shadowing, uint8_t{255});
+  drop_if_all(level.voxel_anisotropy, pack_anisotropy(source.anisotropy));
   drop_if_all(level.voxel_sggx, pack_flake_sggx(SymMat3::identity()));
   for_each_brick(level, [&](const Brick& brick, const ivec3& coordinates) {
     const Box3 voxels = active_box(brick);
@@ -141,22 +145,32 @@ Result<LevelData> pack_source_fog(const SourceVolume& source, const Job& job) {
 
 Result<LevelData> pack_fog(const SourceVolume& source, uint32_t level, Downsampling method, const Job& job) {
   const FogDownsampler downsampler(source, level, method);
-  const FogChannels channels{!source.albedos.empty(), method != Downsampling::Linear, method == Downsampling::Aniso};
+  const FogChannels channels{!source.albedos.empty(), method != Downsampling::Linear, method == Downsampling::Aniso,
+                             method == Downsampling::Matched};
+  DensityGrid matched;
+  if (method == Downsampling::Matched) {
+    FARFIELD_TRY_LET(matched, matched_densities(source, level, job.step("", 0, 0.5)));
+  }
   const auto voxels_of = [&](const ivec3& brick, FogVoxels& voxels) {
     const ivec3 corner = brick * kBrickSide, inside = glm::min(downsampler.dims() - corner, ivec3(kBrickSide));
+    const uint32_t densities = matched.brick_at(brick);
     // In parallel here, too: a root has few bricks.
     parallel_for(voxels.size(), 16, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
         const auto v = static_cast<int>(i);
         const ivec3 voxel(v & 7, v >> 3 & 7, v >> 6);
         const bool is_inside = voxel.x < inside.x && voxel.y < inside.y && voxel.z < inside.z;
-        voxels[i] = is_inside && !job.is_cancelled() ? downsampler.voxel(corner + voxel) : FogVoxel();
+        if (!is_inside || job.is_cancelled())
+          voxels[i] = FogVoxel();
+        else if (method == Downsampling::Matched)
+          voxels[i] = downsampler.voxel(corner + voxel, densities == kEmptyBrick ? 0.0f : matched.bricks[densities][i]);
+        else
+          voxels[i] = downsampler.voxel(corner + voxel);
       }
     });
     return std::ranges::any_of(voxels, [](const FogVoxel& voxel) { return voxel.density > 0; });
   };
-  FARFIELD_TRY_LET(auto packed, pack_bricks(source, downsampler.dims(), source.voxel_size * (1 << level), channels, job,
-                                            voxels_of));
+  FARFIELD_TRY_LET(auto packed, pack_bricks(source, downsampler.dims(), source.voxel_size * (1 << level), channels, job.step("", 0.5, 1), voxels_of));
   packed.header.level = level;
   return packed;
 }

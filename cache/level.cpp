@@ -5,6 +5,8 @@
 #include <bit>
 #include <cmath>
 
+#include "scattering/fog_phase.h"
+
 namespace farfield {
 
 namespace {
@@ -66,6 +68,11 @@ vec3 unpack_albedo(PackedAlbedo albedo) {
     result[i] = angle == 255 ? 1.0f : root * root;
   }
   return result;
+}
+
+int8_t pack_anisotropy(float g) {
+  if (!(std::abs(g) > 0)) return 0;  // NaN, too
+  return static_cast<int8_t>(std::lround(127 * std::clamp(g, -kMostFogAnisotropy, kMostFogAnisotropy)));
 }
 
 PackedVertexColor pack_vertex_color(const vec4& linear_rgba) {

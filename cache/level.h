@@ -61,6 +61,10 @@ struct PackedAlbedo {
 PackedAlbedo pack_albedo(const vec3& albedo);
 vec3 unpack_albedo(PackedAlbedo albedo);
 
+/// A mean cosine of scattering, within kMostFogAnisotropy, as round(127 g).
+int8_t pack_anisotropy(float g);
+inline float unpack_anisotropy(int8_t packed) { return static_cast<float>(packed) * (1.0f / 127.0f); }
+
 /// A unit vector on the octahedron, 7e-5 rad [Cigolle et al. 2014].
 struct PackedNormal {
   std::array<int16_t, 2> octahedral;
@@ -189,7 +193,8 @@ inline size_t brick_table_index(const ivec3& dims, const ivec3& brick) {
   /* shapes inside voxels */                                                                                          \
   ARRAY(29, VoxelOctants,       voxel_octants,        PackedOctants,     Voxels)        /* shares of density; full */ \
   /* media that scatter by themselves */                                                                              \
-  ARRAY(30, VoxelAlbedo,        voxel_albedo,         PackedAlbedo,      Voxels)        /* of fog; the header's */
+  ARRAY(30, VoxelAlbedo,        voxel_albedo,         PackedAlbedo,      Voxels)        /* of fog; the header's */   \
+  ARRAY(31, VoxelAnisotropy,    voxel_anisotropy,     int8_t,            Voxels)        /* of all that a voxel of fog scatters; the header's, of what is scattered once */
 // clang-format on
 
 /// The arrays, owned (Array = std::vector<T>) while baking, or as spans into a mapped file at run time.

@@ -29,7 +29,8 @@ Problem check_medium(const LevelView& level) {
   if (header.medium != Medium::Flakes && header.medium != Medium::Fog)
     return fmt::format("the medium is number {}", static_cast<uint32_t>(header.medium));
   if (header.medium == Medium::Flakes) {
-    const bool is_plain = header.fog_albedo == vec3(0.0f) && header.fog_anisotropy == 0 && level.voxel_albedo.empty();
+    const bool is_plain = header.fog_albedo == vec3(0.0f) && header.fog_anisotropy == 0 && level.voxel_albedo.empty() &&
+                          level.voxel_anisotropy.empty();
     return is_plain ? Problem() : "it has properties of fog, and no fog";
   }
   if (!(min_component(header.fog_albedo) >= 0 && max_component(header.fog_albedo) <= 1))
@@ -273,6 +274,13 @@ Problem check_reserved_bytes(const LevelView& level) {
   return {};
 }
 
+Problem check_anisotropy(const LevelView& level) {
+  const auto broken = [](int8_t g) { return std::abs(unpack_anisotropy(g)) > kMostFogAnisotropy; };
+  const auto found = std::ranges::find_if(level.voxel_anisotropy, broken);
+  if (found == level.voxel_anisotropy.end()) return {};
+  return fmt::format("voxel_anisotropy[{}] is {}", found - level.voxel_anisotropy.begin(), *found);
+}
+
 Problem check_self_shadowing(const LevelView& level) {
   const auto found = std::ranges::find(level.voxel_self_shadowing, uint8_t{0});
   if (found == level.voxel_self_shadowing.end()) return {};
@@ -292,7 +300,7 @@ Problem find_structure_problem(const LevelView& level) {
 Problem find_value_problem(const LevelView& level) {
   if (Problem problem = check_positions(level)) return problem;
   if (Problem problem = check_voxels_inside(level)) return problem;
-  return first_of({check_reserved_bytes(level), check_self_shadowing(level)});
+  return first_of({check_reserved_bytes(level), check_self_shadowing(level), check_anisotropy(level)});
 }
 
 }  // namespace farfield

@@ -22,17 +22,32 @@ using DensityBrick = std::array<float, kVolumeBrickVoxels>;
 using AlbedoBrick = std::array<std::array<uint16_t, 3>, kVolumeBrickVoxels>;
 inline vec3 unpack_albedo(const std::array<uint16_t, 3>& a) { return vec3(a[0], a[1], a[2]) * (1.0f / 65535.0f); }
 
-/// Immutable once read; any thread. Voxel (i, j, k) is the cube
-///   origin + rotation * (voxel_size * [i, i + 1] x [j, j + 1] x [k, k + 1]),   0 <= i < 8 brick_dims.x, ...
-/// Its bounds are tight: the first and the last voxel along each axis that have a density are in it.
-struct SourceVolume {
+/// Densities of a sparse grid, in bricks. Voxel (i, j, k) is the cube voxel_size * [i, i + 1] x [j, j + 1] x [k, k + 1].
+struct DensityGrid {
+  double voxel_size = 0;  ///< > 0, scene units
+  ivec3 dims{0};          ///< voxels; the rest of the last bricks is empty
+  ivec3 brick_dims{0};
+  std::vector<uint32_t> brick_table;  ///< x fastest: index into bricks, or kEmptyBrick
+  std::vector<DensityBrick> bricks;   ///< in no particular order
+
+  size_t table_index(const ivec3& brick) const {
+    return static_cast<size_t>(brick.x) +
+           static_cast<size_t>(brick_dims.x) *
+               (static_cast<size_t>(brick.y) + static_cast<size_t>(brick_dims.y) * static_cast<size_t>(brick.z));
+  }
+  /// Index of the brick at these coordinates, in bricks; kEmptyBrick also outside of the grid.
+  uint32_t brick_at(const ivec3& brick) const {
+    for (int axis = 0; axis < 3; ++axis)
+      if (brick[axis] < 0 || brick[axis] >= brick_dims[axis]) return kEmptyBrick;
+    return brick_table[table_index(brick)];
+  }
+};
+
+/// Immutable once read; any thread. Bounds are tight: the first and the last voxel along each axis that have a density
+/// are in it. Bricks may be shared by entries of the table (tiles).
+struct SourceVolume : DensityGrid {
   dvec3 origin{0.0};         ///< lower corner of voxel (0, 0, 0), in the source's space
   glm::dmat3 rotation{1.0};  ///< columns: the grid's axes in the source's space; orthonormal, may mirror
-  double voxel_size = 0;     ///< > 0, scene units
-  ivec3 dims{0};             ///< voxels; the rest of the last bricks is empty
-  ivec3 brick_dims{0};
-  std::vector<uint32_t> brick_table;  ///< x fastest: index into bricks, or kEmptyBrick. Bricks may be shared (tiles)
-  std::vector<DensityBrick> bricks;   ///< in no particular order
   std::vector<AlbedoBrick> albedos;   ///< none: `albedo` everywhere. Else as many as bricks
   vec3 albedo{1.0f};                  ///< single scattering, linear RGB in [0, 1]
   float anisotropy = 0;               ///< g of Henyey and Greenstein
@@ -41,12 +56,6 @@ struct SourceVolume {
   float densest = 0;                  ///< the largest density
   std::vector<std::string> warnings;  ///< one line each: what was ignored, guessed or dropped
   uint64_t source_hash = 0;           ///< of the file's bytes and the options
-
-  size_t table_index(const ivec3& brick) const {
-    return static_cast<size_t>(brick.x) +
-           static_cast<size_t>(brick_dims.x) *
-               (static_cast<size_t>(brick.y) + static_cast<size_t>(brick_dims.y) * static_cast<size_t>(brick.z));
-  }
 };
 
 /// Index of a voxel within its brick.

@@ -26,7 +26,7 @@ struct SceneBakeOptions {
   uint32_t rays_per_voxel = 200;
   bool source_only = false;  ///< level 0 alone
   SceneOptions read;
-  Downsampling downsampling = Downsampling::Iso;  ///< of volumes
+  Downsampling downsampling = Downsampling::Matched;  ///< of volumes
   /// Only each part_count-th asset, from number `part` on: for processes that share the work. part < part_count.
   uint32_t part = 0, part_count = 1;
 

@@ -67,13 +67,13 @@ class BlockMedium {
   const FogBlock& block_;
 };
 
-/// The homogeneous cube; white.
+/// The homogeneous cube.
 class CubeMedium {
  public:
   explicit CubeMedium(const FogCube& cube) : cube_(cube) {}
 
   int side() const { return cube_.side; }
-  vec3 albedo(const ivec3&) const { return vec3(1.0f); }
+  vec3 albedo(const ivec3&) const { return cube_.albedo; }
 
   Stop stop(const Line& line, double depth) const {
     double length = kInfinity;
@@ -119,7 +119,7 @@ BlockLight follow(const Medium& medium, const BlockRays& rays) {
   const float u = of_block.next(), v = of_block.next();
   BlockLight light;
   dvec3 left(0.0);
-  double stopped = 0;
+  double stopped = 0, cosines = 0;
   for (uint32_t i = 0; i < count; ++i) {
     Line line = entering_ray(i, medium.side(), {u, v});
     // Every ray that can be stopped is, and counts as often as it would.
@@ -129,6 +129,7 @@ BlockLight follow(const Medium& medium, const BlockRays& rays) {
     Stop stop = medium.stop(line, -std::log1p(-static_cast<double>(rng.next()) * weight));
     if (!stop.is_hit()) continue;  // by rounding, at the very end
     stopped += weight;
+    const dvec3 came = line.direction;
     dvec3 throughput(1.0);
     uint32_t events = 0;
     while (stop.is_hit() && events < kMostEvents) {
@@ -143,6 +144,7 @@ BlockLight follow(const Medium& medium, const BlockRays& rays) {
       stop = medium.stop(line, free_depth(rng));
     }
     left += weight * throughput;
+    cosines += weight * throughput.y * glm::dot(came, line.direction);
     if (light.events.size() < events) light.events.resize(events, 0.0);
     light.events[events - 1] += weight;
   }
@@ -150,6 +152,7 @@ BlockLight follow(const Medium& medium, const BlockRays& rays) {
   light.single_if_white /= count;
   if (!(stopped > 0)) return light;
   light.albedo = left / stopped;
+  light.cosine = left.y > 0 ? cosines / left.y : 0;
   for (double& share : light.events) share /= stopped;
   return light;
 }
@@ -171,8 +174,7 @@ FogBlock::FogBlock(const SourceVolume& source, const ivec3& lower, int side)
 
 double FogBlock::depth(const ivec3& voxel) const {
   const ivec3 at = lower_ + voxel, brick = at / kVolumeBrickSide;
-  if (brick.x >= source_.brick_dims.x || brick.y >= source_.brick_dims.y || brick.z >= source_.brick_dims.z) return 0;
-  const uint32_t index = source_.brick_table[source_.table_index(brick)];
+  const uint32_t index = source_.brick_at(brick);
   return index == kEmptyBrick ? 0.0 : static_cast<double>(source_.bricks[index][index_in_brick(at)]) * voxel_size_;
 }
 

@@ -47,6 +47,7 @@ class FogBlock {
 struct FogCube {
   double depth = 0;  ///< along an edge
   int side = 1;      ///< in the block's voxels
+  vec3 albedo{1.0f};
 };
 
 /// Means over all rays that enter.
@@ -54,6 +55,7 @@ struct BlockLight {
   dvec3 single{0.0};           ///< share that leaves after exactly one event
   double single_if_white = 0;  ///< the same for albedo 1
   dvec3 albedo{1.0};           ///< throughput of what is scattered at all, when it leaves: the effective albedo
+  double cosine = 0;           ///< between how light came and how it leaves, of what is scattered at all
   std::vector<double> events;  ///< share of what is scattered at all that has n events, n = 1, ...: of cubes
 };
 

@@ -8,7 +8,9 @@
 #include <limits>
 #include <vector>
 
+#include "base/parallel.h"
 #include "prefilter/block_light.h"
+#include "prefilter/match_fog.h"
 #include "prefilter/voxel_marks.h"
 #include "scattering/albedo.h"
 
@@ -17,6 +19,8 @@ namespace {
 
 /// Light is followed where it could change an albedo, or the share of single scattering, by this much.
 constexpr double kLeastEffect = 1e-3;
+constexpr double kLeastDifference = 0.01;  ///< of depths, by which a block must differ from its even spread
+constexpr double kMostBackward = 0.9;      ///< g of the other sign: nearly all light goes back
 constexpr double kLeastShare = 1e-3;  ///< of single scattering, and of an axis's attenuation by the largest
 constexpr uint32_t kRaysPerArea = 24, kMostRays = 3072;  ///< rays for each fine voxel that a side shows
 
@@ -115,6 +119,38 @@ float share_of_single_scattering(const BlockLight& block, const BlockLight& cube
   return std::isfinite(share) ? static_cast<float>(std::clamp(share, kLeastShare, 1.0)) : 1.0f;
 }
 
+/// Along an edge of the block, by Transp.
+double mean_depth(const BlockSums& sums) {
+  return (sums.axis_depth.x + sums.axis_depth.y + sums.axis_depth.z) / 3;
+}
+
+/// Whether a block and the cube that stands for it could differ in what they scatter: the cube is thinner than the block
+/// would be if its fog were spread evenly, or fog is so thin that it does not matter.
+bool differs_from_cube(const BlockSums& sums, int side, double depth) {
+  if (is_homogeneous(sums, side)) return false;
+  const double even_depth = sums.depth / (static_cast<double>(side) * side);
+  return sums.largest * side > kLeastEffect && std::abs(even_depth - depth) > kLeastDifference * depth;
+}
+
+/// The g with which the cube sends light back as much as the block does: its mean cosine rises with g.
+float anisotropy_of(double cosine, const FogCube& cube, BlockRays rays) {
+  double low = -kMostBackward, high = std::max(0.0, static_cast<double>(rays.anisotropy));
+  const auto excess = [&](double g) {
+    rays.anisotropy = static_cast<float>(g);
+    return follow_light(cube, rays).cosine - cosine;
+  };
+  double at_high = excess(high);
+  if (at_high <= 0) return static_cast<float>(high);
+  double at_low = excess(low);
+  if (at_low >= 0) return static_cast<float>(low);
+  for (int i = 0; i < 3; ++i) {  // false position: nearly straight
+    const double g = low + (high - low) * -at_low / (at_high - at_low), at_g = excess(g);
+    (at_g > 0 ? high : low) = g;
+    (at_g > 0 ? at_high : at_low) = at_g;
+  }
+  return static_cast<float>(low + (high - low) * -at_low / (at_high - at_low));
+}
+
 /// An ellipsoid that stops, along the axes, what the block stops.
 void shape_by_axes(const dvec3& axis_depth, double length, FogVoxel& voxel) {
   const double largest = std::max({axis_depth.x, axis_depth.y, axis_depth.z});
@@ -136,18 +172,28 @@ const char* name_of(Downsampling method) {
       return "iso";
     case Downsampling::Aniso:
       return "aniso";
+    case Downsampling::Matched:
+      return "matched";
   }
   return "unknown";
 }
 
 Result<Downsampling> parse_downsampling(const std::string& name) {
-  for (const auto method : {Downsampling::Linear, Downsampling::Transp, Downsampling::Iso, Downsampling::Aniso})
+  for (const auto method : {Downsampling::Linear, Downsampling::Transp, Downsampling::Iso, Downsampling::Aniso,
+                            Downsampling::Matched})
     if (name == name_of(method)) return method;
-  return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is none of linear, transp, iso, aniso", name));
+  return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is none of linear, transp, iso, aniso, matched", name));
 }
 
 FogDownsampler::FogDownsampler(const SourceVolume& source, uint32_t level, Downsampling method)
     : source_(source), level_(level), method_(method), dims_((source.dims + ((1 << level) - 1)) >> ivec3(level)) {}
+
+float FogDownsampler::density(const ivec3& coordinate) const {
+  const int side = 1 << level_;
+  const FogBlock block(source_, coordinate * side, side);
+  if (block.is_empty()) return 0;
+  return static_cast<float>(mean_depth(sum_block(block)) / (source_.voxel_size * side));
+}
 
 FogVoxel FogDownsampler::voxel(const ivec3& coordinate) const {
   const int side = 1 << level_;
@@ -162,26 +208,82 @@ FogVoxel FogDownsampler::voxel(const ivec3& coordinate) const {
     voxel.density = static_cast<float>(sums.depth / std::pow(side, 2) / length);
     return voxel;
   }
-  const double depth = (sums.axis_depth.x + sums.axis_depth.y + sums.axis_depth.z) / 3;
+  const double depth = mean_depth(sums);
   voxel.density = static_cast<float>(depth / length);
   if (method_ == Downsampling::Aniso) shape_by_axes(sums.axis_depth, length, voxel);
   if (method_ == Downsampling::Transp || !is_worth_following(sums, side, source_.anisotropy)) return voxel;
-
-  const auto area = static_cast<uint64_t>(side) * static_cast<uint64_t>(side);
-  const BlockRays rays{static_cast<uint32_t>(std::min<uint64_t>(kRaysPerArea * area, kMostRays)),
-                       seed_of(coordinate, level_), source_.anisotropy};
+  const BlockRays rays = block_rays(coordinate);
   const BlockLight of_block = follow_light(block, rays), of_cube = follow_light(FogCube{depth, side}, rays);
-  if (source_.anisotropy != 0) {
+  if (source_.anisotropy != 0)
     voxel.self_shadowing = share_of_single_scattering(of_block, of_cube, sums.albedo);
-    return voxel;
-  }
+  else
+    set_albedo(sums.albedo, of_block, of_cube, voxel);
+  return voxel;
+}
+
+FogVoxel FogDownsampler::voxel(const ivec3& coordinate, float density) const {
+  const int side = 1 << level_;
+  const FogBlock block(source_, coordinate * side, side);
+  FogVoxel voxel;
+  voxel.density = density;
+  voxel.anisotropy = source_.anisotropy;
+  const BlockSums sums = sum_block(block);
+  if (sums.voxels == 0) return voxel;
+  voxel.albedo = vec3(sums.albedo);
+  const double depth = static_cast<double>(density) * source_.voxel_size * side;
+  if (!differs_from_cube(sums, side, depth)) return voxel;
+  BlockRays rays = block_rays(coordinate);
+  const BlockLight of_block = follow_light(block, rays);
+  FogCube cube{depth, side, vec3(1.0f)};
+  if (min_component(sums.darkest) < 1) set_albedo(sums.albedo, of_block, follow_light(cube, rays), voxel);
+  cube.albedo = source_.albedos.empty() ? cluster_albedo(voxel.albedo, voxel.self_shadowing) : voxel.albedo;
+  voxel.anisotropy = anisotropy_of(of_block.cosine, cube, rays);
+  return voxel;
+}
+
+BlockRays FogDownsampler::block_rays(const ivec3& coordinate) const {
+  const auto area = uint64_t{1} << 2 * level_;
+  return {static_cast<uint32_t>(std::min<uint64_t>(kRaysPerArea * area, kMostRays)), seed_of(coordinate, level_),
+          source_.anisotropy};
+}
+
+void FogDownsampler::set_albedo(const dvec3& albedo, const BlockLight& of_block, const BlockLight& of_cube,
+                                FogVoxel& voxel) const {
   dvec3 seen;
   for (int c = 0; c < 3; ++c) seen[c] = solve_collision_albedo(of_cube.events, of_block.albedo[c]);
   if (source_.albedos.empty())
-    voxel.self_shadowing = share_of_cluster(sums.albedo, seen);
+    voxel.self_shadowing = share_of_cluster(albedo, seen);
   else
     voxel.albedo = vec3(seen);
-  return voxel;
+}
+
+Result<DensityGrid> matched_densities(const SourceVolume& source, uint32_t level, const Job& job) {
+  const FogDownsampler downsampler(source, level, Downsampling::Transp);
+  DensityGrid grid;
+  grid.voxel_size = std::ldexp(source.voxel_size, static_cast<int>(level));
+  grid.dims = downsampler.dims();
+  grid.brick_dims = (grid.dims + (kVolumeBrickSide - 1)) / kVolumeBrickSide;
+  const ivec3& n = grid.brick_dims;
+  const size_t entries = static_cast<size_t>(n.x) * static_cast<size_t>(n.y) * static_cast<size_t>(n.z);
+  grid.brick_table.assign(entries, kEmptyBrick);
+  for (size_t entry = 0; entry < entries; ++entry) {
+    const auto e = static_cast<int>(entry);
+    const ivec3 corner = ivec3(e % n.x, e / n.x % n.y, e / (n.x * n.y)) * kVolumeBrickSide;
+    DensityBrick brick;
+    parallel_for(brick.size(), 32, [&](size_t begin, size_t end) {
+      for (size_t i = begin; i < end && !job.is_cancelled(); ++i) {
+        const auto v = static_cast<int>(i);
+        const ivec3 voxel = corner + ivec3(v & 7, v >> 3 & 7, v >> 6);
+        brick[i] = glm::all(glm::lessThan(voxel, grid.dims)) ? downsampler.density(voxel) : 0.0f;
+      }
+    });
+    if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, "bake: cancelled");
+    if (std::ranges::none_of(brick, [](float density) { return density > 0; })) continue;
+    grid.brick_table[entry] = static_cast<uint32_t>(grid.bricks.size());
+    grid.bricks.push_back(brick);
+  }
+  FARFIELD_TRY(match_fog(source, level, grid, job));
+  return grid;
 }
 
 }  // namespace farfield

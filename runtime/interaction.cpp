@@ -9,6 +9,7 @@
 #include <cmath>
 #include <new>
 #include <type_traits>
+#include <utility>
 
 #include "runtime/close_up.h"
 #include "runtime/interaction_model.h"
@@ -129,6 +130,10 @@ FogParams fog_params(const LevelView& level, const InstanceRecord& instance, uin
   params.albedo = level.voxel_albedo.empty() ? level.header.fog_albedo : unpack_albedo(level.voxel_albedo[voxel]);
   params.self_shadowing = unorm_at(level.voxel_self_shadowing, voxel);
   params.anisotropy = level.header.fog_anisotropy;
+  if (!level.voxel_anisotropy.empty()) {  // of all that the voxel scatters, so nothing is left to tell apart
+    params.anisotropy = unpack_anisotropy(level.voxel_anisotropy[voxel]);
+    params.albedo = cluster_albedo(params.albedo, std::exchange(params.self_shadowing, 1.0f));
+  }
   params.has_shape = !level.voxel_sggx.empty();
   if (params.has_shape) params.sggx = to_world(unpack(level.voxel_sggx[voxel]), ScaledInverse(instance));
   return params;

@@ -25,7 +25,7 @@ inline void add_fog_flags(CLI::App* command, FogOptions& fog) {
 
 inline void add_downsampling_flag(CLI::App* command, Downsampling& downsampling) {
   add_parsed_option(command, "--downsampling", downsampling, parse_downsampling,
-                    "OpenVDB: how levels are made: linear, transp, iso, aniso")
+                    "OpenVDB: how levels are made: linear, transp, iso, aniso, matched")
       ->default_str(name_of(downsampling));
 }
 
