@@ -33,7 +33,7 @@ constexpr uint64_t kMostManifestBytes = 16 << 20;
 
 // Goes up when the same scene, assets and options come to give other pictures, so that a shot that was begun before
 // does not go on with frames that look otherwise.
-constexpr int kLooksVersion = 5;
+constexpr int kLooksVersion = 6;
 
 // A file's name, size and time of change: enough to see that it is another one.
 std::string identity(const fs::path& path) {
