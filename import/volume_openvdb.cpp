@@ -131,6 +131,7 @@ class VdbReader {
     for (auto name = file_.beginName(); name != file_.endName(); ++name) {
       contents_.grids.push_back(file_.readGridMetadata(name.gridName()));
     }
+    if (contents_.grids.empty()) return error(ErrorCode::BadFile, "there is no grid in it; was it cut short?");
     return choose_density();
   }
 
@@ -503,7 +504,8 @@ Result<T> guarded(const std::string& path, const Read& read) {
     openvdb::initialize();
     return read();
   } catch (const std::bad_alloc&) {
-    return make_error(ErrorCode::Unsupported, fmt::format("{}: it does not fit into memory", path));
+    return make_error(ErrorCode::BadFile,
+                      fmt::format("{}: asks for more memory than there is: it is too large, or damaged", path));
   } catch (const std::exception& exception) {
     return make_error(ErrorCode::BadFile, fmt::format("{}: not a readable OpenVDB file: {}", path, exception.what()));
   }

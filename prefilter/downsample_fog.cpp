@@ -24,12 +24,12 @@ constexpr double kMostBackward = 0.9;      ///< g of the other sign: nearly all 
 constexpr double kLeastShare = 1e-3;  ///< of single scattering, and of an axis's attenuation by the largest
 constexpr uint32_t kRaysPerArea = 24, kMostRays = 3072;  ///< rays for each fine voxel that a side shows
 
-/// -log of the mean of exp(-depth): finite whatever the depths are.
+/// -log of the mean of exp(-depth): finite and exact to a few roundings, however large or small the depths are.
 double depth_of_columns(const std::vector<double>& depths) {
   const double least = *std::ranges::min_element(depths);
   double sum = 0;
-  for (const double depth : depths) sum += std::exp(least - depth);
-  return least - std::log(sum / static_cast<double>(depths.size()));
+  for (const double depth : depths) sum += std::expm1(least - depth);
+  return least - std::log1p(sum / static_cast<double>(depths.size()));
 }
 
 /// What one pass over a block's voxels tells.

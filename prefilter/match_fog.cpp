@@ -23,6 +23,8 @@ constexpr double kLinesPerVoxel = 24;  ///< through each, in each pass
 /// How much a block's own density counts against what lines say of it, in units of the sums: inside of thick fog, where
 /// no line gets, it is all there is.
 constexpr double kPrior = 0.03;
+constexpr int kWholePasses = 3;
+constexpr double kMostWhole = 0.3;  ///< a step of all densities together changes none by a larger share
 constexpr double kFewestLines = 20000, kMostLines = 4e6;
 constexpr uint64_t kSeed = 0x666f67;  // "fog"
 
@@ -46,7 +48,7 @@ void walk_grid(const DensityGrid& grid, int side, const VoxelRay& ray, const Vis
 class FogMatcher {
  public:
   FogMatcher(const DensityGrid& source, uint32_t k, DensityGrid& level, const Job& job)
-      : source_(source), level_(level), side_(1 << k), job_(job), box_{dvec3(0.0), dvec3(level.dims * side_)}, local_(level.bricks) {
+      : source_(source), level_(level), side_(1 << k), job_(job), box_{dvec3(0.0), dvec3(level.dims * side_)}, known_(level.bricks.size() * kVolumeBrickVoxels, 0.0f), local_(level.bricks) {
     const double in_level_voxels = surface_area(box_) / (side_ * static_cast<double>(side_));
     // Of lines through the box, this share goes through a voxel: the ratio of their surfaces.
     lines_ = static_cast<uint64_t>(std::clamp(kLinesPerVoxel * in_level_voxels / 6, kFewestLines, kMostLines));
@@ -54,6 +56,7 @@ class FogMatcher {
 
   Result<void> run() {
     for (int pass = 0; pass < kPasses; ++pass) FARFIELD_TRY(match_voxels());
+    for (int pass = 0; pass < kWholePasses; ++pass) FARFIELD_TRY(match_whole());
     return {};
   }
 
@@ -84,7 +87,7 @@ class FogMatcher {
       for (size_t i = begin; i < end && !job_.is_cancelled(); ++i) see(isotropic_line(box_, even_coordinates(i, seed)));
     });
     if (job_.is_cancelled()) return make_error(ErrorCode::Cancelled, "bake: cancelled");
-    job_.report(static_cast<double>(passes_) / kPasses, "match");
+    job_.report(static_cast<double>(passes_) / (kPasses + kWholePasses), "match");
     return {};
   }
 
@@ -116,6 +119,29 @@ class FogMatcher {
       const double local = static_cast<double>(local_[v / kVolumeBrickVoxels][v % kVolumeBrickVoxels]) / static_cast<double>(density);
       const double ratio = (sums[v].source.value() + kPrior * local) / (sums[v].medium.value() + kPrior);
       density = static_cast<float>(static_cast<double>(density) * std::clamp(ratio, 1 / kMostMatch, kMostMatch));
+      known_[v] = static_cast<float>(sums[v].medium.value() / (sums[v].medium.value() + kPrior));
+    }
+    return {};
+  }
+
+  /// A Newton step of one exponent for all densities, as far as lines know them, towards as much that is stopped as in
+  /// the source: least squares alone leave a bias.
+  Result<void> match_whole() {
+    FixedSum missing, slope;
+    FARFIELD_TRY(for_next_lines([&](const VoxelRay& ray) {
+      double depth = 0, known = 0;
+      visit_depths(ray, [&](size_t number, double of_part) {
+        depth += of_part;
+        known += of_part * static_cast<double>(known_[number]);
+      });
+      missing.add(std::exp(-depth) - std::exp(-source_depth(ray)));
+      slope.add(known * std::exp(-depth));
+    }));
+    if (!(slope.value() > 0)) return {};
+    const double step = std::clamp(missing.value() / slope.value(), -kMostWhole, kMostWhole);
+    for (size_t v = 0; v < known_.size(); ++v) {
+      float& density = level_.bricks[v / kVolumeBrickVoxels][v % kVolumeBrickVoxels];
+      density = static_cast<float>(static_cast<double>(density) * (1 + step * static_cast<double>(known_[v])));
     }
     return {};
   }
@@ -127,6 +153,7 @@ class FogMatcher {
   const VoxelBox box_;  ///< of the level, in voxels of the source
   uint64_t lines_ = 0;  ///< of each pass
   uint64_t passes_ = 0;
+  std::vector<float> known_;               ///< of each voxel: what lines say of it against what its block says
   const std::vector<DensityBrick> local_;  ///< densities of the blocks alone
 };
 
