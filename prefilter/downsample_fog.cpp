@@ -22,7 +22,7 @@ constexpr double kLeastEffect = 1e-3;
 constexpr double kLeastDifference = 0.01;  ///< of depths, by which a block must differ from its even spread
 constexpr double kMostBackward = 0.9;      ///< g of the other sign: nearly all light goes back
 constexpr double kLeastShare = 1e-3;  ///< of single scattering, and of an axis's attenuation by the largest
-constexpr uint32_t kRaysPerArea = 24, kMostRays = 3072;  ///< rays for each fine voxel that a side shows
+constexpr uint32_t kRaysPerArea = 24, kMostRays = 1024;  ///< rays for each fine voxel that a side shows
 
 /// -log of the mean of exp(-depth): finite and exact to a few roundings, however large or small the depths are.
 double depth_of_columns(const std::vector<double>& depths) {
@@ -143,11 +143,10 @@ float anisotropy_of(double cosine, const FogCube& cube, BlockRays rays) {
   if (at_high <= 0) return static_cast<float>(high);
   double at_low = excess(low);
   if (at_low >= 0) return static_cast<float>(low);
-  for (int i = 0; i < 3; ++i) {  // false position: nearly straight
-    const double g = low + (high - low) * -at_low / (at_high - at_low), at_g = excess(g);
-    (at_g > 0 ? high : low) = g;
-    (at_g > 0 ? at_high : at_low) = at_g;
-  }
+  // The cosine is nearly straight in g: one point between, and the root on the chord that has it.
+  const double g = low + (high - low) * -at_low / (at_high - at_low), at_g = excess(g);
+  (at_g > 0 ? high : low) = g;
+  (at_g > 0 ? at_high : at_low) = at_g;
   return static_cast<float>(low + (high - low) * -at_low / (at_high - at_low));
 }
 
