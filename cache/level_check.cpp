@@ -33,9 +33,9 @@ Problem check_medium(const LevelView& level) {
                           level.voxel_anisotropy.empty();
     return is_plain ? Problem() : "it has properties of fog, and no fog";
   }
-  if (!(min_component(header.fog_albedo) >= 0 && max_component(header.fog_albedo) <= 1))
-    return fmt::format("the fog's albedo is ({}, {}, {})", header.fog_albedo.x, header.fog_albedo.y,
-                       header.fog_albedo.z);
+  const vec3& albedo = header.fog_albedo;
+  if (!is_finite(albedo) || min_component(albedo) < 0 || max_component(albedo) > 1)
+    return fmt::format("the fog's albedo is ({}, {}, {})", albedo.x, albedo.y, albedo.z);
   if (!(std::abs(header.fog_anisotropy) <= kMostFogAnisotropy))
     return fmt::format("the fog's anisotropy is {}", header.fog_anisotropy);
   const bool has_flakes = !level.voxel_diffuse.empty() || !level.voxel_specular.empty() ||

@@ -41,7 +41,7 @@ struct ImportOptions {
   int mesh =
       -1;  ///< glTF only: import this mesh alone, in its own space; -1: all nodes of the default scene, flattened
   int node = -1;  ///< glTF only: import all that this node of the file and those below show, in the node's own space
-  FogOptions fog;  ///< OpenVDB files only: what read_volume() is given
+  FogOptions fog{};  ///< OpenVDB files only: what read_volume() is given
   FileHashes* known_hashes = nullptr;  ///< hashes are looked for there first; null: they read
 };
 

@@ -38,7 +38,7 @@ Result<void> check_options(const FogOptions& options) {
     return invalid(fmt::format("--anisotropy must be from -{0} to {0}, not {1}", kMostAnisotropy, options.anisotropy));
   if (!options.albedo) return {};
   const vec3& albedo = *options.albedo;
-  if (!(min_component(albedo) >= 0 && max_component(albedo) <= 1))
+  if (!is_finite(albedo) || min_component(albedo) < 0 || max_component(albedo) > 1)
     return invalid(fmt::format("--albedo must be from 0 to 1, not {},{},{}", albedo.x, albedo.y, albedo.z));
   return {};
 }

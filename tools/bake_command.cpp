@@ -183,7 +183,7 @@ void add_bake_command(CLI::App& app, Action& action) {
                     "Leave what was ignored or guessed to the manifest, as render does, which says it itself");
   command->add_option("--report", arguments->report, "Write what was done, with seconds per stage, as JSON");
   command->footer(
-      "Examples:\n  farfield bake oak.obj.gz -o oak.farfield --finest-grid 512\n"
+      "Example:\n  farfield bake oak.obj.gz -o oak.farfield --finest-grid 512\n"
       "  farfield bake cloud.vdb -o cloud.farfield --density-scale 20 --albedo 0.999 --anisotropy 0.8");
   command->callback([arguments, &action] { action = [arguments] { return run_bake(*arguments); }; });
 }

@@ -240,7 +240,7 @@ TEST_F(ReadVolume, OptionsAreChecked) {
   const fs::path path = write({one_voxel()});
   for (const FogOptions& options :
        {FogOptions{.density_scale = 0}, FogOptions{.density_scale = NAN}, FogOptions{.anisotropy = 0.99},
-        FogOptions{.albedo = vec3(1.1f)}, FogOptions{.albedo = vec3(NAN)}, FogOptions{.anisotropy = NAN}})
+        FogOptions{.albedo = vec3(1.1f)}, FogOptions{.albedo = vec3(0.5f, NAN, 0.5f)}, FogOptions{.anisotropy = NAN}})
     failure(path, ErrorCode::InvalidArgument, options);
 }
 
