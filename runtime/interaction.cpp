@@ -234,6 +234,8 @@ Interaction make_interaction(const TracedLevel& level, const InstanceRecord& ins
     interaction.kind = Interaction::Kind::Volume;
     const FogParams params = fog_params(view, instance, hit.element);
     interaction.albedo = cluster_albedo(params.albedo, params.self_shadowing);
+    interaction.anisotropy = params.anisotropy;
+    interaction.self_shadowing = params.self_shadowing;
     InteractionModel::put(interaction, InteractionModel(FogPhase(params, interaction.wo)));
     return interaction;
   }
@@ -242,6 +244,7 @@ Interaction make_interaction(const TracedLevel& level, const InstanceRecord& ins
     const FlakeParams params = flake_params(view, instance, hit.element);
     interaction.albedo = layered_albedo(params.specular, params.diffuse + params.transmission);
     interaction.emission = emission_at(view.voxel_emission, hit.element);
+    interaction.self_shadowing = params.self_shadowing;
     InteractionModel::put(interaction, InteractionModel(FlakePhase(params, interaction.wo)));
     return interaction;
   }

@@ -527,6 +527,9 @@ TEST_F(WholeRoad, AVolumeIsBakedJudgedAndRendered) {
     arguments.insert(arguments.end(), fog.begin(), fog.end());
     expect_quiet_success(farfield(arguments));
   };
+  const ProcessOutput source = farfield({"info", path("ball.vdb"), "--albedo", "1"});
+  EXPECT_NE(source.out.find("voxels with a density in 15 x 15 x 15"), std::string::npos) << source.out;
+  EXPECT_EQ(Json::parse(farfield({"info", path("ball.vdb"), "--json"}).out)["dims"], Json({15, 15, 15}));
   run({"bake", path("ball.vdb"), "-o", path("ball.farfield"), "--coarsest-grid", "4"});
   expect_quiet_success(farfield({"verify", path("ball.farfield")}));
   const ProcessOutput info = farfield({"info", path("ball.farfield")});
