@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -17,20 +16,20 @@
 #include <utility>
 
 #include "bake/asset_textures.h"
+#include "bake/bake_volume.h"
 #include "bake/bake_workspace.h"
+#include "bake/level_writer.h"
 #include "bake/pack_level.h"
 #include "bake/pack_source.h"
-#include "bake/slab_hull.h"
+#include "bake/stopwatch.h"
 #include "bake/volume_job.h"
 #include "base/file_io.h"
 #include "base/free_memory.h"
 #include "base/hash.h"
 #include "base/index.h"
 #include "base/result.h"
-#include "bvh/level_scene.h"
-#include "bvh/ray_cost.h"
-#include "bvh/traced_morph.h"
 #include "cache/level_file.h"
+#include "import/read_volume.h"
 #include "prefilter/face_materials.h"
 #include "prefilter/macrosurface.h"
 #include "prefilter/place_lattice.h"
@@ -47,16 +46,6 @@ namespace fs = std::filesystem;
 
 constexpr uint32_t kMaxGrid = 4096;  ///< the brick table has (grid / 8)^3 entries
 
-/// Seconds since it was made.
-class Stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point start_ = Clock::now();
-};
-
 Result<void> check_options(const BakeOptions& options) {
   const uint32_t finest = options.finest_grid, coarsest = options.coarsest_grid;
   if (!std::has_single_bit(finest) || !std::has_single_bit(coarsest) || finest < coarsest || finest > kMaxGrid) {
@@ -69,7 +58,13 @@ Result<void> check_options(const BakeOptions& options) {
 }
 
 /// Equal text and source hash give equal bytes.
-std::string canonical_options(const BakeOptions& options) {
+std::string canonical_options(const BakeOptions& options, bool is_volume) {
+  if (is_volume) {
+    const std::string import = fmt::format("fog={}{}", kFogVersion, canonical_text(options.import.fog));
+    if (options.source_only) return "source_only=1 " + import;
+    return fmt::format("coarsest_grid={} downsampling={} {}", options.coarsest_grid, name_of(options.downsampling),
+                       import);
+  }
   const std::string node = options.import.node < 0 ? "" : fmt::format("node={} ", options.import.node);
   const std::string import = fmt::format("mesh={} {}condition={}", options.import.mesh, node, kConditionVersion);
   if (options.source_only) return "source_only=1 " + import;
@@ -79,12 +74,12 @@ std::string canonical_options(const BakeOptions& options) {
 }
 
 /// What a bake of `source` with these options writes into its manifest, but for the levels.
-Manifest make_manifest(const std::string& source, uint64_t source_hash, const BakeOptions& options) {
+Manifest make_manifest(const std::string& source, uint64_t source_hash, const BakeOptions& options, bool is_volume) {
   Manifest manifest;
   manifest.generator = "farfield " FARFIELD_VERSION;
   manifest.source = source;
   manifest.source_hash = source_hash;
-  manifest.options = canonical_options(options);
+  manifest.options = canonical_options(options, is_volume);
   return manifest;
 }
 
@@ -201,22 +196,15 @@ uint64_t least_shell_bytes(const Surface& wall, double resolution) {
   return kTriangle * kTrianglesPerVoxel * mark_voxels(wall, {dvec3(0.0), resolution}).size();
 }
 
-/// All vertices and stored voxels of a level.
-void add_to_hull(const LevelView& level, SlabHull& hull) {
-  for (const vec3& position : level.positions) hull.add(position);
-  const float voxel_size = level.header.resolution;
-  for_each_brick(level, [&](const Brick& brick, const ivec3& coordinates) {
-    const Box3 voxels = active_box(brick);
-    const vec3 corner = level.header.volume_origin + vec3(coordinates * kBrickSide) * voxel_size;
-    hull.add(Box3{corner + voxels.lower * voxel_size, corner + voxels.upper * voxel_size});
-  });
-}
-
 /// One bake, step by step.
 class Baker {
  public:
   Baker(const BakeOptions& options, SourceSurface source, BakeWorkspace workspace, BakeReport report)
-      : options_(options), workspace_(std::move(workspace)), report_(std::move(report)), source_(std::move(source)) {}
+      : options_(options),
+        workspace_(std::move(workspace)),
+        report_(std::move(report)),
+        writer_(workspace_.asset_dir(), options.measure_resident, report_.manifest),
+        source_(std::move(source)) {}
 
   Result<BakeReport> run() {
     const Box3 bounds = source_.bounds();
@@ -232,9 +220,7 @@ class Baker {
     for (uint32_t level = 1; level <= last_level_; ++level) {
       FARFIELD_TRY(bake_level(level, std::ldexp(finest_resolution, static_cast<int>(level) - 1)));
     }
-    report_.manifest.hull = hull_.corners();
-    for (const vec3& corner : report_.manifest.hull) report_.manifest.bounds.extend(corner);
-    FARFIELD_TRY(write_manifest(workspace_.asset_dir(), report_.manifest));
+    FARFIELD_TRY(writer_.finish());
     FARFIELD_TRY(workspace_.publish());
     options_.job.report(1, "done");
     return std::move(report_);
@@ -455,45 +441,11 @@ class Baker {
     level_report.triangles = face_count(level);
     level_report.voxels = voxel_count(level);
     if (options_.job.is_cancelled()) return cancelled();
-    if (!level.has_surface() && !level.has_volume()) return {};  // too thin for any ray to have hit it
-
-    const LevelView view = view_of(level);
-    FARFIELD_TRY_LET(const auto cost,
-                     options_.measure_resident ? options_.measure_resident(view) : measure_level_scene(view));
-    if (cost.resident_bytes > most_bytes_worth_writing(number)) return {};
-    level_report.is_written = true;
-
-    LevelEntry entry;
-    entry.level = number;
-    entry.resolution = std::ldexp(report_.manifest.base_resolution, static_cast<int>(number));
-    entry.grid = level_report.grid;
-    entry.file = fmt::format("level_{}.ffl", number);
-    entry.triangles = face_count(level);
-    entry.voxels = voxel_count(level);
-    entry.bricks = level.bricks.size();
-    entry.resident_bytes = cost.resident_bytes;
-    entry.build_peak_bytes = cost.build_peak_bytes;
-    entry.ray_cost = ray_cost(view);
-    const fs::path path = workspace_.asset_dir() / entry.file;
-    FARFIELD_TRY_LET(const auto bytes, write_level(path, level));
-    entry.file_bytes = bytes;
-    FARFIELD_TRY_LET(const auto hash, hash_level_file(path));
-    entry.file_hash = hash;
-    if (!report_.manifest.levels.empty()) {
-      FARFIELD_TRY_LET(entry.morph, measure_morph_to(view));
-    }
-    report_.manifest.levels.push_back(entry);
-
-    add_to_hull(view, hull_);
-    if (number > 0) from_stored_ = identity_maps(surface_.positions.size(), surface_.triangles.size());
+    FARFIELD_TRY_LET(level_report.is_written,
+                     writer_.write(level, level_report.grid, most_bytes_worth_writing(number)));
+    if (level_report.is_written && number > 0)
+      from_stored_ = identity_maps(surface_.positions.size(), surface_.triangles.size());
     return {};
-  }
-
-  /// What the morph from the last written level to this one takes.
-  Result<LevelCost> measure_morph_to(const LevelView& level) const {
-    const fs::path finer = workspace_.asset_dir() / report_.manifest.levels.back().file;
-    FARFIELD_TRY_LET(const auto file, LevelFile::open(finer, LevelCheck::Structure));
-    return measure_morph(file->view(), level);
   }
 
   /// The source is always written. A coarser level must save a tenth against the last one written; for the root, which
@@ -503,7 +455,7 @@ class Baker {
     const LevelEntry& last = report_.manifest.levels.back();
     uint64_t before = last.resident_bytes;
     if (last.level == 0) before += texture_bytes(level);
-    return level == last_level_ ? before - std::min<uint64_t>(before, 1) : before - before / 10;
+    return most_bytes_after(before, level == last_level_);
   }
 
   uint64_t texture_bytes(uint32_t level) const {
@@ -527,6 +479,7 @@ class Baker {
   const BakeOptions& options_;
   BakeWorkspace workspace_;
   BakeReport report_;
+  LevelWriter writer_;         ///< into report_.manifest
   SourceSurface source_;       ///< until it is resolved
   SurfaceOrder source_order_;  ///< of level 0
   AssetLook look_;
@@ -537,8 +490,7 @@ class Baker {
   Surface wall_;                   ///< pieces of the walls that are wrapped at the level at hand
   std::vector<uint8_t> is_shell_;  ///< faces of surface_ that are such walls
   MorphMaps from_stored_;          ///< from the last written level to surface_
-  SlabHull hull_;
-  dvec3 middle_{0.0};  ///< of the source's bounds
+  dvec3 middle_{0.0};              ///< of the source's bounds
   uint32_t last_level_ = 0;
 };
 
@@ -551,6 +503,58 @@ BakeReport nothing_to_do(Manifest manifest, const Stopwatch& watch) {
   return report;
 }
 
+/// What goes into a manifest before anything is baked, and how the rest is.
+struct Task {
+  std::string source_name;
+  uint64_t source_hash = 0;
+  std::vector<HashedFile> source_files;
+  std::vector<std::string> warnings;
+  bool is_volume = false;
+  std::function<Result<BakeReport>(BakeWorkspace workspace, BakeReport report)> run;
+};
+
+/// Runs a task unless its result is there already.
+Result<BakeReport> bake_unless_up_to_date(Task task, const fs::path& out, const BakeOptions& options) {
+  const Stopwatch watch;
+  BakeReport report;
+  report.warnings = task.warnings;
+  report.manifest = make_manifest(task.source_name, task.source_hash, options, task.is_volume);
+  report.manifest.source_files = std::move(task.source_files);
+  report.manifest.warnings = std::move(task.warnings);
+  const auto find_same = [&]() -> std::optional<Manifest> {
+    auto manifest = read_manifest(out);
+    const bool is_same = manifest && are_same_bake(*manifest, report.manifest) && is_whole(out, *manifest);
+    return is_same && !options.even_if_up_to_date ? std::optional(std::move(*manifest)) : std::nullopt;
+  };
+  if (auto manifest = find_same()) return nothing_to_do(std::move(*manifest), watch);
+  FARFIELD_TRY_LET(auto workspace, with_warnings(BakeWorkspace::open(out, options.job), report.warnings));
+  if (workspace.has_waited()) {
+    if (auto manifest = find_same()) return nothing_to_do(std::move(*manifest), watch);
+  }
+  const std::vector<std::string> warnings = report.warnings;
+  FARFIELD_TRY_LET(auto baked, with_warnings(task.run(std::move(workspace), std::move(report)), warnings));
+  baked.total_seconds = watch.seconds();
+  return baked;
+}
+
+/// Imports a mesh or a volume and bakes it; import_seconds says how long the import took.
+Result<BakeReport> import_and_bake(const fs::path& source, const fs::path& out, const BakeOptions& options,
+                                   double& import_seconds) {
+  const Stopwatch watch;
+  const auto named_briefly = [&](auto imported) {
+    std::vector<std::string>& warnings = imported ? imported->warnings : imported.error().warnings;
+    warnings = without_folder(std::move(warnings), source.parent_path());
+    import_seconds = watch.seconds();
+    return imported;
+  };
+  if (is_volume_file(source)) {
+    FARFIELD_TRY_LET(auto volume, named_briefly(read_volume(source, options.import.fog, options.job.quiet())));
+    return bake(std::move(volume), source.filename().string(), out, options);
+  }
+  FARFIELD_TRY_LET(auto asset, named_briefly(import_asset(source, options.import, options.job.quiet())));
+  return bake(std::move(asset), source.filename().string(), out, options);
+}
+
 }  // namespace
 
 std::optional<Manifest> find_up_to_date(const fs::path& source, const fs::path& out, const BakeOptions& options) {
@@ -558,7 +562,7 @@ std::optional<Manifest> find_up_to_date(const fs::path& source, const fs::path& 
   if (!manifest || !manifest->source_files) return std::nullopt;
   const auto source_hash = hash_source(source, *manifest->source_files, options.import);
   if (!source_hash) return std::nullopt;
-  const Manifest wanted = make_manifest(source.filename().string(), *source_hash, options);
+  const Manifest wanted = make_manifest(source.filename().string(), *source_hash, options, is_volume_file(source));
   if (!are_same_bake(*manifest, wanted) || !is_whole(out, *manifest)) return std::nullopt;
   return std::move(*manifest);
 }
@@ -574,12 +578,8 @@ Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeO
     if (auto manifest = find_up_to_date(source, out, options)) return nothing_to_do(std::move(*manifest), watch);
   }
   options.job.report(0, "import");
-  auto imported = import_asset(source, options.import, options.job.quiet());
-  std::vector<std::string>& warnings = imported ? imported->warnings : imported.error().warnings;
-  warnings = without_folder(std::move(warnings), source.parent_path());
-  FARFIELD_TRY_LET(auto asset, std::move(imported));
-  const double import_seconds = watch.seconds();
-  FARFIELD_TRY_LET(auto report, bake(std::move(asset), source.filename().string(), out, options));
+  double import_seconds = 0;
+  FARFIELD_TRY_LET(auto report, import_and_bake(source, out, options, import_seconds));
   report.import_seconds = import_seconds;
   report.total_seconds += import_seconds;
   return report;
@@ -588,27 +588,21 @@ Result<BakeReport> bake(const fs::path& source, const fs::path& out, const BakeO
 Result<BakeReport> bake(ImportedAsset asset, const std::string& source_name, const fs::path& out,
                         const BakeOptions& options) {
   FARFIELD_TRY(check_options(options));
-  const Stopwatch watch;
-  BakeReport report;
-  report.warnings = asset.warnings;
-  report.manifest = make_manifest(source_name, asset.source_hash, options);
-  report.manifest.source_files = std::move(asset.source_files);
-  report.manifest.warnings = std::move(asset.warnings);
-  const auto find_same = [&]() -> std::optional<Manifest> {
-    auto manifest = read_manifest(out);
-    const bool is_same = manifest && are_same_bake(*manifest, report.manifest) && is_whole(out, *manifest);
-    return is_same && !options.even_if_up_to_date ? std::optional(std::move(*manifest)) : std::nullopt;
+  Task task{source_name, asset.source_hash, std::move(asset.source_files), std::move(asset.warnings), false, {}};
+  task.run = [&](BakeWorkspace workspace, BakeReport report) {
+    return Baker(options, std::move(asset.source), std::move(workspace), std::move(report)).run();
   };
-  if (auto manifest = find_same()) return nothing_to_do(std::move(*manifest), watch);
-  FARFIELD_TRY_LET(auto workspace, with_warnings(BakeWorkspace::open(out, options.job), report.warnings));
-  if (workspace.has_waited()) {
-    if (auto manifest = find_same()) return nothing_to_do(std::move(*manifest), watch);
-  }
-  const std::vector<std::string> warnings = report.warnings;
-  Baker baker(options, std::move(asset.source), std::move(workspace), std::move(report));
-  FARFIELD_TRY_LET(auto baked, with_warnings(baker.run(), warnings));
-  baked.total_seconds = watch.seconds();
-  return baked;
+  return bake_unless_up_to_date(std::move(task), out, options);
+}
+
+Result<BakeReport> bake(SourceVolume volume, const std::string& source_name, const fs::path& out,
+                        const BakeOptions& options) {
+  FARFIELD_TRY(check_options(options));
+  Task task{source_name, volume.source_hash, {}, std::move(volume.warnings), true, {}};
+  task.run = [&](BakeWorkspace workspace, BakeReport report) {
+    return bake_levels(volume, options, std::move(workspace), std::move(report));
+  };
+  return bake_unless_up_to_date(std::move(task), out, options);
 }
 
 }  // namespace farfield

@@ -13,15 +13,18 @@
 #include "base/result.h"
 #include "cache/level.h"
 #include "cache/manifest.h"
+#include "import/source_volume.h"
 #include "prefilter/condition.h"
+#include "prefilter/downsample_fog.h"
 
 namespace farfield {
 
 struct BakeOptions {
-  uint32_t finest_grid = 512;       ///< level 1: longest side of the bounds / r_1. A power of two >= coarsest_grid
-  uint32_t coarsest_grid = 8;       ///< last level, the root
-  uint32_t rays_per_voxel = 200;    ///< thesis 10.1.3
-  bool source_only = false;         ///< write only level 0 (what --full-detail renders)
+  uint32_t finest_grid = 512;     ///< level 1: longest side of the bounds / r_1. A power of two >= coarsest_grid
+  uint32_t coarsest_grid = 8;     ///< last level, the root
+  uint32_t rays_per_voxel = 200;  ///< thesis 10.1.3
+  Downsampling downsampling = Downsampling::Matched;  ///< of volumes, whose grids and rays the file decides
+  bool source_only = false;                           ///< write only level 0 (what --full-detail renders)
   bool even_if_up_to_date = false;  ///< of an asset in memory: its hash does not say all that it depends on
   ImportOptions import;
 
@@ -60,9 +63,13 @@ std::optional<Manifest> find_up_to_date(const std::filesystem::path& source, con
 
 /// Bakes `source` into the folder `out` (created; conventionally NAME.farfield). Same source and options give the same
 /// bytes for any thread count. Interrupted bakes resume: finished levels are found by hash and kept; the manifest is
-/// written last. Errors, with the warnings that came before: those of import_asset; InvalidArgument (options); Io (with
-/// nothing half-written under a final name); Cancelled.
+/// written last. Errors, with the warnings that came before: those of import_asset or read_volume; InvalidArgument
+/// (options); Io (with nothing half-written under a final name); Cancelled.
 Result<BakeReport> bake(const std::filesystem::path& source, const std::filesystem::path& out,
+                        const BakeOptions& options);
+
+/// The same for a volume in memory.
+Result<BakeReport> bake(SourceVolume volume, const std::string& source_name, const std::filesystem::path& out,
                         const BakeOptions& options);
 
 /// The same for an asset in memory; source_name goes into the manifest. options.import only names what was asked for.

@@ -74,10 +74,6 @@ inline constexpr const char* kTextureModuleEntry = "farfield_texture_module_2";
 /// later calls say the same).
 Result<const TextureModule*> texture_module();
 
-/// Where texture_module looks: FARFIELD_MODULE_DIR alone if it is set, else the places that the build tree and the
-/// installation have it, as seen from the program or library that holds this code.
-std::vector<std::filesystem::path> texture_module_folders();
-
 /// Loads the module from the first folder that has its file. Errors: Io.
 Result<const TextureModule*> load_texture_module(std::span<const std::filesystem::path> folders);
 

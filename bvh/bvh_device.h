@@ -69,9 +69,6 @@ struct MeasuredScene {
   uint64_t build_peak_bytes = 0;  ///< further ones at the worst moment of the build
 };
 
-/// As much memory as there is.
-inline constexpr uint64_t kAnyBytes = std::numeric_limits<uint64_t>::max();
-
 /// Builds a scene of what `make` makes (see build_static_scene) on the calling thread alone, so that the same
 /// geometries always take the same bytes. Embree gets no more than `most_bytes`, at the worst moment. Holds
 /// device.build_mutex(). what: for messages, "the BVH of 8 quads". Errors: OutOfBudget (most_bytes are not enough), Io

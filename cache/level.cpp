@@ -5,6 +5,8 @@
 #include <bit>
 #include <cmath>
 
+#include "scattering/fog_phase.h"
+
 namespace farfield {
 
 namespace {
@@ -47,6 +49,30 @@ PackedColor pack_color(const vec3& linear_rgb) {
 vec3 unpack_color(PackedColor color) {
   const vec3 root(unpack_unorm8(color.sqrt_rgb[0]), unpack_unorm8(color.sqrt_rgb[1]), unpack_unorm8(color.sqrt_rgb[2]));
   return root * root;
+}
+
+PackedAlbedo pack_albedo(const vec3& albedo) {
+  PackedAlbedo packed;
+  for (int i = 0; i < 3; ++i) {
+    const float root = std::sqrt(std::fmin(std::fmax(albedo[i], 0.0f), 1.0f));  // NaN becomes 0
+    packed.angle_rgb[static_cast<size_t>(i)] = to_unorm8(std::asin(root) / (0.5f * kPi));
+  }
+  return packed;
+}
+
+vec3 unpack_albedo(PackedAlbedo albedo) {
+  vec3 result;
+  for (int i = 0; i < 3; ++i) {
+    const uint8_t angle = albedo.angle_rgb[static_cast<size_t>(i)];
+    const float root = std::sin(0.5f * kPi * unpack_unorm8(angle));
+    result[i] = angle == 255 ? 1.0f : root * root;
+  }
+  return result;
+}
+
+int8_t pack_anisotropy(float g) {
+  if (!(std::abs(g) > 0)) return 0;  // NaN, too
+  return static_cast<int8_t>(std::lround(127 * std::clamp(g, -kMostFogAnisotropy, kMostFogAnisotropy)));
 }
 
 PackedVertexColor pack_vertex_color(const vec4& linear_rgba) {

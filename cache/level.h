@@ -52,6 +52,19 @@ struct PackedRadiance {
 PackedRadiance pack_radiance(const vec3& radiance);
 vec3 unpack_radiance(PackedRadiance radiance);
 
+/// Single-scattering albedos, linear RGB in [0, 1], each channel stored as round(255 (2 / pi) asin(sqrt(c))): fine where
+/// nearly all is absorbed and, more so, where nearly nothing is. 0 and 1 are exact, 0.999 is off by 5e-5.
+struct PackedAlbedo {
+  std::array<uint8_t, 3> angle_rgb;
+  friend bool operator==(const PackedAlbedo&, const PackedAlbedo&) = default;
+};
+PackedAlbedo pack_albedo(const vec3& albedo);
+vec3 unpack_albedo(PackedAlbedo albedo);
+
+/// A mean cosine of scattering, within kMostFogAnisotropy, as round(127 g).
+int8_t pack_anisotropy(float g);
+inline float unpack_anisotropy(int8_t packed) { return static_cast<float>(packed) * (1.0f / 127.0f); }
+
 /// A unit vector on the octahedron, 7e-5 rad [Cigolle et al. 2014].
 struct PackedNormal {
   std::array<int16_t, 2> octahedral;
@@ -100,6 +113,12 @@ inline constexpr uint32_t kMorphCollapsed = 0xfffffffeu;  ///< (faces) its area 
 /// starts with: corner k of the face is corner (turn + k) % 3 of the source's triangle.
 inline constexpr int kSourceTurnBits = 2;
 
+/// What the voxels of a volume are.
+enum class Medium : uint32_t {
+  Flakes = 0,  ///< pieces of surfaces that are too small to see (scattering/flake_phase.h)
+  Fog = 1,     ///< a medium that scatters by itself (scattering/fog_phase.h)
+};
+
 /// What every level has besides arrays. Lengths are in the asset's local units, positions relative to its origin.
 struct LevelHeader {
   uint32_t level = 0;        ///< k
@@ -110,6 +129,9 @@ struct LevelHeader {
   float hot_spot = 0;        ///< of the volume's flakes, in [0, kStrongestHotSpot] (scattering/hot_spot.h)
   float highlight_lean = 0;  ///< of the same, at most kMostHighlightLean (scattering/highlight_lean.h)
   vec3 open_side{0.0f};      ///< of the same, at most kMostOpenSide long (scattering/open_side.h)
+  Medium medium = Medium::Flakes;
+  vec3 fog_albedo{0.0f};     ///< single scattering, of fog alone: linear RGB in [0, 1]; where voxels have none of their own
+  float fog_anisotropy = 0;  ///< g of Henyey and Greenstein, of fog alone: within kMostFogAnisotropy
 };
 
 /// Coordinates, in bricks, of an entry of the brick table.
@@ -169,7 +191,10 @@ inline size_t brick_table_index(const ivec3& dims, const ivec3& brick) {
   /* walls made of pieces */                                                                                          \
   ARRAY(28, FaceGap,            face_gap,             uint8_t,           Faces)         /* unorm8; 0 */               \
   /* shapes inside voxels */                                                                                          \
-  ARRAY(29, VoxelOctants,       voxel_octants,        PackedOctants,     Voxels)        /* shares of density; full */
+  ARRAY(29, VoxelOctants,       voxel_octants,        PackedOctants,     Voxels)        /* shares of density; full */ \
+  /* media that scatter by themselves */                                                                              \
+  ARRAY(30, VoxelAlbedo,        voxel_albedo,         PackedAlbedo,      Voxels)        /* of fog; the header's */   \
+  ARRAY(31, VoxelAnisotropy,    voxel_anisotropy,     int8_t,            Voxels)        /* of all that a voxel of fog scatters; the header's, of what is scattered once */
 // clang-format on
 
 /// The arrays, owned (Array = std::vector<T>) while baking, or as spans into a file in memory at run time.

@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "cache/level_format.h"
+#include "scattering/fog_phase.h"
 #include "scattering/highlight_lean.h"
 #include "scattering/hot_spot.h"
 #include "scattering/open_side.h"
@@ -21,6 +22,26 @@ using Problem = std::optional<std::string>;
 
 constexpr uint64_t kMaxElements = 0xfffffff0u;  // indices have 32 bits, and the last few values have other meanings
 constexpr int kMaxBrickDim = 1 << 20;           // voxel coordinates stay far inside an int
+
+/// What only one of the media has is 0 in the other.
+Problem check_medium(const LevelView& level) {
+  const LevelHeader& header = level.header;
+  if (header.medium != Medium::Flakes && header.medium != Medium::Fog)
+    return fmt::format("the medium is number {}", static_cast<uint32_t>(header.medium));
+  if (header.medium == Medium::Flakes) {
+    const bool is_plain = header.fog_albedo == vec3(0.0f) && header.fog_anisotropy == 0 && level.voxel_albedo.empty() &&
+                          level.voxel_anisotropy.empty();
+    return is_plain ? Problem() : "it has properties of fog, and no fog";
+  }
+  const vec3& albedo = header.fog_albedo;
+  if (!is_finite(albedo) || min_component(albedo) < 0 || max_component(albedo) > 1)
+    return fmt::format("the fog's albedo is ({}, {}, {})", albedo.x, albedo.y, albedo.z);
+  if (!(std::abs(header.fog_anisotropy) <= kMostFogAnisotropy))
+    return fmt::format("the fog's anisotropy is {}", header.fog_anisotropy);
+  const bool has_flakes = !level.voxel_diffuse.empty() || !level.voxel_specular.empty() ||
+                          !level.voxel_transmission.empty() || !level.voxel_emission.empty();
+  return has_flakes ? Problem("its fog has properties of flakes") : Problem();
+}
 
 Problem check_header(const LevelView& level) {
   const LevelHeader& header = level.header;
@@ -37,6 +58,7 @@ Problem check_header(const LevelView& level) {
     return fmt::format("the open side is ({}, {}, {})", header.open_side.x, header.open_side.y, header.open_side.z);
   if (!(std::abs(header.highlight_lean) <= kMostHighlightLean))
     return fmt::format("the highlight leans by {}", header.highlight_lean);
+  if (Problem problem = check_medium(level)) return problem;
   if (!level.has_surface() && !level.has_volume()) return "it has neither surface nor volume";
   return {};
 }
@@ -252,6 +274,13 @@ Problem check_reserved_bytes(const LevelView& level) {
   return {};
 }
 
+Problem check_anisotropy(const LevelView& level) {
+  const auto broken = [](int8_t g) { return std::abs(unpack_anisotropy(g)) > kMostFogAnisotropy; };
+  const auto found = std::ranges::find_if(level.voxel_anisotropy, broken);
+  if (found == level.voxel_anisotropy.end()) return {};
+  return fmt::format("voxel_anisotropy[{}] is {}", found - level.voxel_anisotropy.begin(), *found);
+}
+
 Problem check_self_shadowing(const LevelView& level) {
   const auto found = std::ranges::find(level.voxel_self_shadowing, uint8_t{0});
   if (found == level.voxel_self_shadowing.end()) return {};
@@ -271,7 +300,7 @@ Problem find_structure_problem(const LevelView& level) {
 Problem find_value_problem(const LevelView& level) {
   if (Problem problem = check_positions(level)) return problem;
   if (Problem problem = check_voxels_inside(level)) return problem;
-  return first_of({check_reserved_bytes(level), check_self_shadowing(level)});
+  return first_of({check_reserved_bytes(level), check_self_shadowing(level), check_anisotropy(level)});
 }
 
 }  // namespace farfield

@@ -38,9 +38,10 @@ vec3 to_vec3(const std::array<float, 3>& stored) { return {stored[0], stored[1],
 
 /// The first version that has what a level needs, so that older readers read what they can.
 uint32_t version_of(const LevelHeader& level, std::span<const SectionEntry> table) {
-  constexpr uint32_t kLastOfVersion1 = 18, kLastOfVersion2 = 27, kLastOfVersion3 = 28, kLastOfVersion4 = 29;
+  constexpr uint32_t kLastOfVersion1 = 18, kLastOfVersion2 = 27, kLastOfVersion3 = 28, kLastOfVersion5 = 29;
   const uint32_t last_section = table.empty() ? 0 : table.back().id;
-  if (level.highlight_lean != 0 || last_section > kLastOfVersion4) return kLevelFileVersion;
+  if (level.medium != Medium::Flakes || last_section > kLastOfVersion5) return kLevelFileVersion;
+  if (level.highlight_lean != 0) return 5;
   if (level.open_side != vec3(0.0f) || last_section > kLastOfVersion3) return 4;
   if (level.hot_spot != 0 || last_section > kLastOfVersion2) return 3;
   return last_section <= kLastOfVersion1 ? 1 : 2;
@@ -57,6 +58,9 @@ LevelHeader to_level_header(const FileHeader& header) {
   level.hot_spot = header.hot_spot;
   level.open_side = to_vec3(header.open_side);
   level.highlight_lean = header.highlight_lean;
+  level.medium = static_cast<Medium>(header.medium);
+  level.fog_albedo = to_vec3(header.fog_albedo);
+  level.fog_anisotropy = header.fog_anisotropy;
   return level;
 }
 
@@ -116,9 +120,6 @@ class Parser {
     const Bytes table = file_.subspan(kHeaderBytes, header_.section_count * sizeof(SectionEntry));
     if (hash_head(header_, table) != header_.head_hash) {
       return broken_at(offsetof(FileHeader, head_hash), "the checksum of header and section table does not match");
-    }
-    if (std::ranges::any_of(header_.reserved, [](uint8_t byte) { return byte != 0; })) {
-      return broken_at(offsetof(FileHeader, reserved), "reserved bytes are not 0");
     }
     table_.resize(header_.section_count);
     if (!table.empty()) std::memcpy(table_.data(), table.data(), table.size());
@@ -252,6 +253,9 @@ std::vector<std::byte> encode_head(const LevelView& level, const LevelLayout& la
   header.hot_spot = level.header.hot_spot;
   copy_to(header.open_side, level.header.open_side);
   header.highlight_lean = level.header.highlight_lean;
+  header.medium = static_cast<uint32_t>(level.header.medium);
+  copy_to(header.fog_albedo, level.header.fog_albedo);
+  header.fog_anisotropy = level.header.fog_anisotropy;
   header.head_hash = hash_head(header, std::as_bytes(std::span(table)));
 
   std::vector<std::byte> head(head_bytes(table.size()));

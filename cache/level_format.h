@@ -24,8 +24,8 @@ enum class LevelCheck;  // cache/level_file.h
 
 static_assert(std::endian::native == std::endian::little, "level files are little-endian and are used in place");
 
-/// 1 had arrays 1 to 18 alone, 2 those to 27 and no hot spot, 3 those to 28 and no open side.
-inline constexpr uint32_t kLevelFileVersion = 5;
+/// 1 had arrays 1 to 18 alone, 2 those to 27 and no hot spot, 3 those to 28 and no open side, 5 those to 29 and no fog.
+inline constexpr uint32_t kLevelFileVersion = 6;
 /// Not text (first byte), and a copy in text mode breaks it (line ends), as in PNG.
 inline constexpr std::array<uint8_t, 8> kLevelFileMagic = {0x89, 'F', 'F', 'L', 'V', '\r', '\n', 0x1a};
 inline constexpr uint64_t kSectionAlignment = 64;  ///< a cache line; Brick needs it
@@ -88,9 +88,11 @@ struct FileHeader {
   float hot_spot;
   std::array<float, 3> open_side;
   float highlight_lean;
-  std::array<uint8_t, 20> reserved;  ///< 0
+  uint32_t medium;
+  std::array<float, 3> fog_albedo;
+  float fog_anisotropy;
 };
-static_assert(sizeof(FileHeader) == 128 && offsetof(FileHeader, level) == 32 && offsetof(FileHeader, reserved) == 108);
+static_assert(sizeof(FileHeader) == 128 && offsetof(FileHeader, level) == 32 && offsetof(FileHeader, medium) == 108);
 
 struct SectionEntry {
   uint32_t id;             ///< SectionId

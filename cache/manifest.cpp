@@ -73,6 +73,16 @@ Problem find_level_problem(const LevelEntry& level) {
   return {};
 }
 
+bool is_orthogonal(const glm::dmat3& m) {
+  constexpr double kTolerance = 1e-6;
+  const glm::dmat3 difference = glm::transpose(m) * m - glm::dmat3(1.0);
+  for (int column = 0; column < 3; ++column) {
+    const dvec3 size = glm::abs(difference[column]);
+    if (!(std::max({size.x, size.y, size.z}) <= kTolerance)) return false;  // NaN, too
+  }
+  return true;
+}
+
 Problem find_problem(const Manifest& manifest) {
   if (!is_finite(manifest.bounds.lower) || !is_finite(manifest.bounds.upper) || manifest.bounds.is_empty()) {
     return "the bounds are empty or not finite";
@@ -80,6 +90,7 @@ Problem find_problem(const Manifest& manifest) {
   for (int axis = 0; axis < 3; ++axis) {
     if (!std::isfinite(manifest.origin[axis])) return "the origin is not finite";
   }
+  if (!is_orthogonal(manifest.rotation)) return "the rotation is none";
   if (!std::isfinite(manifest.base_resolution) || !(manifest.base_resolution > 0)) {
     return "base_resolution is not positive";
   }
@@ -195,6 +206,18 @@ std::vector<std::string> warnings_from_json(const Json& json, FieldReader& read)
   return warnings;
 }
 
+/// Three columns.
+glm::dmat3 rotation_from_json(const Json& json, FieldReader& read) {
+  glm::dmat3 rotation(0.0);
+  int column = 0;
+  for (const Json& axis : read.array(json, "rotation")) {
+    if (read.problem || column == 3) break;
+    rotation[column] = read.point(axis, fmt::format("rotation[{}]", column));
+    ++column;
+  }
+  return rotation;
+}
+
 Manifest manifest_from_json(const Json& json, FieldReader& read) {
   Manifest manifest;
   manifest.generator = read.text(json, "generator");
@@ -203,6 +226,7 @@ Manifest manifest_from_json(const Json& json, FieldReader& read) {
   if (json.is_object() && json.contains("source_files")) manifest.source_files = files_from_json(json, read);
   manifest.options = read.text(json, "options");
   manifest.origin = read.point(json, "origin");
+  if (json.is_object() && json.contains("rotation")) manifest.rotation = rotation_from_json(json, read);
   manifest.bounds.lower = vec3(read.point(json, "bounds_lower"));
   manifest.bounds.upper = vec3(read.point(json, "bounds_upper"));
   manifest.base_resolution = read.number(json, "base_resolution", "");
@@ -266,6 +290,13 @@ OrderedJson to_json(const LevelEntry& level) {
 
 }  // namespace
 
+Box3 in_source_space(const Box3& bounds, const Manifest& manifest) {
+  if (bounds.is_empty()) return bounds;
+  Box3 box;
+  for (int i = 0; i < 8; ++i) box.extend(vec3(manifest.origin + manifest.rotation * dvec3(bounds.corner(i))));
+  return box;
+}
+
 std::string manifest_to_json(const Manifest& manifest) {
   OrderedJson hull = OrderedJson::array();
   for (const vec3& point : manifest.hull) hull.push_back(to_json(dvec3(point)));
@@ -283,6 +314,9 @@ std::string manifest_to_json(const Manifest& manifest) {
                       {"base_resolution", manifest.base_resolution},
                       {"levels", std::move(levels)},
                       {"hull", std::move(hull)}};
+  if (manifest.rotation != glm::dmat3(1.0)) {
+    json["rotation"] = {to_json(manifest.rotation[0]), to_json(manifest.rotation[1]), to_json(manifest.rotation[2])};
+  }
   if (manifest.source_files) json["source_files"] = to_json(*manifest.source_files);
   if (!manifest.textures.empty()) json["textures"] = to_json(manifest.textures);
   if (!manifest.materials.empty()) json["materials"] = to_json(manifest.materials);

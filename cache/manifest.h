@@ -71,6 +71,7 @@ struct Manifest {
   std::vector<std::string> warnings;  ///< what the import dropped, missed or ignored, one line each
   std::string options;         ///< canonical text of the bake options, so that equal text and hash mean equal bytes
   dvec3 origin{0.0};           ///< positions are relative to this point of the source's space
+  glm::dmat3 rotation{1.0};    ///< of them there: a point of the source is origin + rotation * position. Orthogonal
   Box3 bounds;                 ///< of all levels, relative to origin
   double base_resolution = 0;  ///< r_0
   std::vector<vec3> hull;      ///< points whose convex hull contains all levels (tight instance bounds)
@@ -79,6 +80,9 @@ struct Manifest {
   std::vector<LevelEntry> levels;
   bool has_checksum = false;  ///< it was read from a file that has one, and that is right; older ones have none
 };
+
+/// The box in the source's space around a box of positions.
+Box3 in_source_space(const Box3& bounds, const Manifest& manifest);
 
 /// Reads DIR/manifest.json. Untrusted: sizes, ranges and names are checked (a level's file may not leave the folder).
 /// Every byte size is at most 2^50, so that sums over assets cannot overflow.

@@ -17,9 +17,12 @@ if(FARFIELD_BUILD_BAKE)
   find_package(TinyGLTF CONFIG REQUIRED)
   # OpenImageIO's own CMake config is broken on Debian 12 (it wants tools that its -dev package does not bring).
   pkg_check_modules(oiio REQUIRED IMPORTED_TARGET OpenImageIO)
+  find_package(Imath 3.1 CONFIG REQUIRED)
+  # OpenVDB's own FindOpenVDB.cmake asks for Boost's and Blosc's development files, of which its headers need none here.
+  find_path(OPENVDB_INCLUDE_DIR openvdb/openvdb.h REQUIRED)
+  find_library(OPENVDB_LIBRARY openvdb REQUIRED)
 endif()
 if(FARFIELD_BUILD_TOOLS)
-  find_package(Imath 3.1 CONFIG REQUIRED)
   find_package(OpenEXR 3.1 CONFIG REQUIRED)
   find_package(CLI11 CONFIG REQUIRED)
   find_package(PNG REQUIRED)

@@ -45,10 +45,6 @@ Result<LevelPlan> plan_level(const LevelEntry& entry, const Box3& bounds, const 
 
 }  // namespace
 
-Box3 in_source_space(const Box3& bounds, const Manifest& manifest) {
-  return {bounds.lower + vec3(manifest.origin), bounds.upper + vec3(manifest.origin)};
-}
-
 Result<std::vector<LevelPlan>> plan_evaluation(const Manifest& manifest, const Box3& source_bounds,
                                                const EvaluateOptions& options) {
   std::vector<LevelPlan> plans;

@@ -23,9 +23,6 @@ struct LevelPlan {
   double cost() const { return static_cast<double>(pixels) * samples_per_pixel; }
 };
 
-/// The box in the space of the file that the asset was baked from.
-Box3 in_source_space(const Box3& bounds, const Manifest& manifest);
-
 /// The levels that the options choose, finest first, with pictures that show both the level and the source. Errors:
 /// those of LevelFile::open; InvalidArgument (no such level, pictures beyond 2^26 pixels).
 Result<std::vector<LevelPlan>> plan_evaluation(const Manifest& manifest, const Box3& source_bounds,

@@ -14,7 +14,9 @@
 #include "import/gltf_assemblies.h"
 #include "import/gltf_document.h"
 #include "import/gltf_nodes.h"
+#include "import/gltf_volumes.h"
 #include "import/read_file.h"
+#include "import/read_volume.h"
 
 namespace farfield {
 namespace {
@@ -150,8 +152,8 @@ void place(GltfCamera& camera, const dmat4& world, const dvec3& origin) {
 
 class SceneReader {
  public:
-  SceneReader(const GltfDocument& document, AssemblyRule rule)
-      : document_(document), model_(document.model), rule_(rule) {}
+  SceneReader(const GltfDocument& document, std::filesystem::path folder, AssemblyRule rule)
+      : document_(document), model_(document.model), folder_(std::move(folder)), rule_(rule) {}
 
   Result<GltfScene> read() {
     scene_.warnings = document_.warnings;
@@ -384,6 +386,7 @@ class SceneReader {
         add_assembly(order[i], i, world);
       else if (node.mesh >= 0 && !hidden[number] && !assemblies_.is_part[number])
         FARFIELD_TRY(add_instances(node, order[i], i, world));
+      if (!hidden[number]) add_volume(order[i], i, world);
     }
     place_instances();
     for (uint32_t i = 0; i < order.size(); ++i) {
@@ -400,6 +403,37 @@ class SceneReader {
     const auto kind = static_cast<size_t>(assemblies_.kind_of[static_cast<size_t>(number)]);
     const InstanceData data = data_of_extras(model_.nodes[static_cast<size_t>(number)]);
     show(number, static_cast<uint32_t>(model_.meshes.size() + kind), index, worlds, {dmat4(1.0)}, {data});
+  }
+
+  /// A volume that a node names; one asset for equal ones. What cannot be read is left out, as broken meshes are.
+  void add_volume(int number, uint32_t index, const std::vector<dmat4>& worlds) {
+    const auto& node = model_.nodes[static_cast<size_t>(number)];
+    auto named = volume_of_extras(node);
+    const auto leave_out = [&](const std::string& why) {
+      warn(fmt::format("node {} ({}): its volume is left out: {}", number, node.name, why));
+    };
+    if (!named) return leave_out(named.error().message);
+    if (!*named) return;
+    const NamedVolume& volume = **named;
+    const auto is_same = [&](const GltfMesh& mesh) {
+      return mesh.volume == volume.file && canonical_text(mesh.fog) == canonical_text(volume.fog);
+    };
+    auto found = std::ranges::find_if(scene_.meshes, is_same);
+    if (found == scene_.meshes.end()) {
+      const auto extent = read_volume_extent(folder_ / volume.file, volume.fog);
+      if (!extent) return leave_out(extent.error().message);
+      GltfMesh mesh;
+      mesh.name = node.name;
+      const std::string stem = std::filesystem::path(volume.file).stem().string();
+      mesh.asset_name = unique_name(stem, fmt::format("volume_{}", number));
+      mesh.bounds = {vec3(extent->lower), vec3(extent->upper)};
+      mesh.volume = volume.file;
+      mesh.fog = volume.fog;
+      scene_.meshes.push_back(std::move(mesh));
+      found = std::prev(scene_.meshes.end());
+    }
+    const auto asset = static_cast<uint32_t>(found - scene_.meshes.begin());
+    show(number, asset, index, worlds, {dmat4(1.0)}, {data_of_extras(node)});
   }
 
   Result<void> add_instances(const tinygltf::Node& node, int number, uint32_t index, const std::vector<dmat4>& worlds) {
@@ -550,6 +584,7 @@ class SceneReader {
 
   const GltfDocument& document_;
   const tinygltf::Model& model_;
+  const std::filesystem::path folder_;  ///< of the file
   const AssemblyRule rule_;
   GltfScene scene_;
   std::vector<uint32_t> first_equal_mesh_;
@@ -611,7 +646,7 @@ Result<AssemblyRule> parse_assembly_rule(const std::string& name) {
 Result<GltfScene> read_gltf_scene(const std::filesystem::path& path, AssemblyRule assemblies) {
   FARFIELD_TRY_LET(const auto bytes, read_file(path));
   FARFIELD_TRY_LET(const auto document, open_gltf(bytes, path));
-  return SceneReader(document, assemblies).read();
+  return SceneReader(document, path.parent_path(), assemblies).read();
 }
 
 }  // namespace farfield

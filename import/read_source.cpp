@@ -11,6 +11,7 @@
 #include "import/gltf_parts.h"
 #include "import/read_file.h"
 #include "import/read_formats.h"
+#include "import/read_volume.h"
 
 namespace farfield {
 namespace {
@@ -47,9 +48,12 @@ Result<SourceMesh> read_as_named(const Bytes& bytes, const fs::path& path, const
   }
   if (starts_with(bytes, "ply") || extension == ".ply") return read_ply(bytes, path);
   if (extension == ".obj") return read_obj(bytes, path);
-  if (extension == ".vdb" || extension == ".nvdb" || extension == ".vol") {
+  if (extension == ".vdb" || is_volume_file(path)) {
+    return make_error(ErrorCode::Unsupported, fmt::format("{}: a volume, where a surface is wanted", path.string()));
+  }
+  if (extension == ".nvdb" || extension == ".vol") {
     return make_error(ErrorCode::Unsupported,
-                      fmt::format("{}: a volume; only surfaces (OBJ, PLY, glTF) can be imported", path.string()));
+                      fmt::format("{}: of volumes OpenVDB files (.vdb) are read; convert it", path.string()));
   }
   return make_error(
       ErrorCode::Unsupported,
@@ -109,6 +113,7 @@ Result<SourceMesh> read_source(const fs::path& path, const ImportOptions& option
 }
 
 Result<uint64_t> hash_source(const fs::path& path, const std::vector<HashedFile>& files, const ImportOptions& options) {
+  if (is_volume_file(path)) return hash_volume(path, options.fog);
   FileHashes own;
   FileHashes& hashes = options.known_hashes ? *options.known_hashes : own;
   if (const auto part = hashes.of_part(path, options.mesh, options.node)) return with_options(*part, options);

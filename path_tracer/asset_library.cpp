@@ -41,8 +41,21 @@ SceneBakeOptions scene_bake_options(const RenderOptions& options) {
   bake.finest_grid = options.finest_grid;
   bake.rays_per_voxel = options.rays_per_voxel;
   bake.source_only = options.full_detail;
-  bake.assemblies = options.assemblies;
+  bake.read = {options.assemblies, options.fog};
+  bake.downsampling = options.downsampling;
   return bake;
+}
+
+// What `farfield bake` is told of a volume: the flags of tools/fog_flags.h.
+void add_fog_flags(const FogOptions& fog, std::vector<std::string>& command) {
+  const auto add = [&](const char* flag, const std::string& value) {
+    command.push_back(fmt::format("{}={}", flag, value));  // a value may start with a minus
+  };
+  if (!fog.density_grid.empty()) add("--density-grid", fog.density_grid);
+  if (fog.density_scale != 1) add("--density-scale", fmt::format("{}", fog.density_scale));
+  if (fog.albedo) add("--albedo", fmt::format("{},{},{}", fog.albedo->x, fog.albedo->y, fog.albedo->z));
+  if (fog.anisotropy != 0) add("--anisotropy", fmt::format("{}", fog.anisotropy));
+  if (fog.level_set) command.push_back("--level-set");
 }
 
 std::vector<std::string> bake_command(const RenderOptions& options, const SceneBakeOptions& bake) {
@@ -57,13 +70,16 @@ std::vector<std::string> bake_command(const RenderOptions& options, const SceneB
                                       "--rays-per-voxel",
                                       fmt::format("{}", bake.rays_per_voxel),
                                       "--assemblies",
-                                      name_of(bake.assemblies),
+                                      name_of(bake.read.assemblies),
+                                      "--downsampling",
+                                      name_of(bake.downsampling),
                                       "--threads",
                                       fmt::format("{}", thread_count()),
                                       "--parent",
                                       fmt::format("{}", ::getpid()),
                                       "--no-warnings"};  // said here, from the manifests
   if (bake.source_only) command.push_back("--source-only");
+  add_fog_flags(bake.read.fog, command);
   return command;
 }
 
@@ -76,7 +92,7 @@ struct ReadyAsset {
 std::optional<ReadyAsset> find_ready(const SceneBakeOptions& bake, const GltfScene& scene, size_t mesh,
                                      FileHashes& hashes) {
   const fs::path folder = asset_folder(bake, scene.meshes[mesh]);
-  if (auto found = find_up_to_date(bake.scene, folder, asset_bake_options(bake, scene, mesh, hashes)))
+  if (auto found = find_up_to_date(asset_source(bake, scene.meshes[mesh]), folder, asset_bake_options(bake, scene, mesh, hashes)))
     return ReadyAsset{folder, std::move(*found)};
   if (!bake.source_only) return std::nullopt;
   SceneBakeOptions whole = bake;

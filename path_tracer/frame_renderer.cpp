@@ -14,6 +14,7 @@
 #include "base/process_memory.h"
 #include "base/result.h"
 #include "cache/manifest.h"
+#include "import/read_scene.h"
 #include "path_tracer/asset_library.h"
 #include "path_tracer/budget_notice.h"
 #include "path_tracer/film.h"
@@ -32,7 +33,7 @@ constexpr uint64_t kMostManifestBytes = 16 << 20;
 
 // Goes up when the same scene, assets and options come to give other pictures, so that a shot that was begun before
 // does not go on with frames that look otherwise.
-constexpr int kLooksVersion = 5;
+constexpr int kLooksVersion = 6;
 
 // A file's name, size and time of change: enough to see that it is another one.
 std::string identity(const fs::path& path) {
@@ -154,7 +155,7 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOption
   renderer->options_.warning = [log = renderer->warnings_](const std::string& line) { log->add(line); };
   const RenderOptions& options = renderer->options_;
 
-  FARFIELD_TRY_LET(auto scene, read_gltf_scene(options.scene, options.assemblies));
+  FARFIELD_TRY_LET(auto scene, read_scene(options.scene, {options.assemblies, options.fog}));
   for (const std::string& warning : scene.warnings) options.warning(warning);  // before an error may come
   FARFIELD_TRY_LET(const auto camera, find_camera(scene, options.camera));
   renderer->camera_ = camera;

@@ -26,7 +26,7 @@ using FrameSink = std::function<Result<void>(const Image& image, const Metadata&
 class FrameRenderer {
  public:
   /// Reads the scene, its lights, and finds or bakes its assets. Errors: InvalidArgument (image size), those of
-  /// read_gltf_scene, make_lights, find_or_bake_assets.
+  /// read_scene, make_lights, find_or_bake_assets.
   static Result<std::unique_ptr<FrameRenderer>> prepare(const RenderOptions& options);
 
   /// Text that is equal if and only if everything that the images depend on is: options, scene, environment, assets.

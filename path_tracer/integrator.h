@@ -52,7 +52,8 @@ enum class LightStrategy : uint8_t {
 struct TraceOptions {
   int samples_per_pixel = 16;
   uint64_t seed = 0;
-  int max_depth = 64;        ///< scattering events per path; paths end earlier by Russian roulette, without bias
+  int max_depth = 4096;      ///< scattering events per path; paths end earlier by Russian roulette, without bias. Light
+                             ///< in a white cloud is scattered hundreds of times
   int roulette_depth = 4;    ///< first event after which Russian roulette may end the path
   float clamp_indirect = 0;  ///< > 0: bounds each indirect contribution (biased, fewer fireflies); 0: unbiased
   bool transparent = false;  ///< camera rays that miss give 0 instead of the environment

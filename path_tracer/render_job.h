@@ -12,6 +12,7 @@
 #include "base/job.h"
 #include "base/result.h"
 #include "farfield/runtime.h"
+#include "bake/bake.h"
 #include "import/gltf_scene.h"
 #include "path_tracer/integrator.h"
 
@@ -19,7 +20,7 @@ namespace farfield {
 
 /// What render and shot have in common.
 struct RenderOptions {
-  std::filesystem::path scene;   ///< .gltf or .glb
+  std::filesystem::path scene;   ///< .gltf, .glb or .vdb
   std::string camera;            ///< its name, or its index in the scene; empty: the first
   double frames_per_second = 0;  ///< of frame numbers; 0: GltfScene::frames_per_second
   int width = 480;
@@ -42,6 +43,8 @@ struct RenderOptions {
   uint32_t finest_grid = 512;                        ///< of assets that have to be baked first
   uint32_t rays_per_voxel = 200;                     ///< the same: SceneBakeOptions::rays_per_voxel
   AssemblyRule assemblies = AssemblyRule::Repeated;  ///< which subtrees of the scene are baked as one
+  FogOptions fog;                                    ///< of a scene that is a volume alone
+  Downsampling downsampling = Downsampling::Matched;     ///< of volumes that have to be baked
   /// Command that bakes: called as BAKER bake SCENE --scene -o LIBRARY ... Empty: this very program.
   std::filesystem::path baker;
   std::function<void(const std::string& line)> message;  ///< for a person who waits, one line each; may be empty

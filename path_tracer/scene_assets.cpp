@@ -41,12 +41,16 @@ Job job_of_asset(const Job& all, const std::string& asset, size_t number, size_t
 std::vector<bool> assets_in_use(const GltfScene& scene) {
   std::vector<bool> in_use(scene.meshes.size(), false);
   for (const GltfInstance& instance : scene.instances)
-    in_use[instance.mesh] = scene.meshes[instance.mesh].triangle_count > 0;
+    in_use[instance.mesh] = !scene.meshes[instance.mesh].is_empty();
   return in_use;
 }
 
 fs::path asset_folder(const SceneBakeOptions& options, const GltfMesh& mesh) {
   return options.library / (mesh.asset_name + (options.source_only ? ".source.farfield" : ".farfield"));
+}
+
+fs::path asset_source(const SceneBakeOptions& options, const GltfMesh& mesh) {
+  return mesh.volume.empty() ? options.scene : options.scene.parent_path() / mesh.volume;
 }
 
 BakeOptions asset_bake_options(const SceneBakeOptions& options, const GltfScene& scene, size_t mesh,
@@ -56,6 +60,9 @@ BakeOptions asset_bake_options(const SceneBakeOptions& options, const GltfScene&
   bake.coarsest_grid = options.coarsest_grid;
   bake.rays_per_voxel = options.rays_per_voxel;
   bake.source_only = options.source_only;
+  bake.downsampling = options.downsampling;
+  bake.import.fog = scene.meshes[mesh].fog;
+  if (!scene.meshes[mesh].volume.empty()) return bake;
   bake.import.node = scene.meshes[mesh].node;
   if (bake.import.node < 0) bake.import.mesh = static_cast<int>(mesh);
   bake.import.known_hashes = &hashes;
@@ -63,7 +70,7 @@ BakeOptions asset_bake_options(const SceneBakeOptions& options, const GltfScene&
 }
 
 Result<size_t> bake_scene_assets(const SceneBakeOptions& options) {
-  FARFIELD_TRY_LET(auto scene, read_gltf_scene(options.scene, options.assemblies));
+  FARFIELD_TRY_LET(auto scene, read_scene(options.scene, options.read));
   for (const std::string& warning : scene.warnings)
     if (options.warning) options.warning(warning);
   std::error_code error;
@@ -80,7 +87,7 @@ Result<size_t> bake_scene_assets(const SceneBakeOptions& options) {
     BakeOptions how = asset_bake_options(options, scene, numbers[i], hashes);
     how.job = job_of_asset(options.job, mesh.asset_name, i, numbers.size());
     if (options.begin) options.begin(mesh.asset_name);
-    const auto report = bake(options.scene, asset_folder(options, mesh), how);
+    const auto report = bake(asset_source(options, mesh), asset_folder(options, mesh), how);
     if (!report && report.error().code == ErrorCode::Cancelled) return tl::unexpected(report.error());
     if (!report) ++failed;
     if (options.end) options.end(mesh.asset_name, report);

@@ -10,6 +10,7 @@
 #include <new>
 #include <optional>
 #include <type_traits>
+#include <utility>
 
 #include "runtime/close_up.h"
 #include "runtime/interaction_model.h"
@@ -139,6 +140,20 @@ FlakeParams flake_params(const LevelView& level, const InstanceRecord& instance,
   return params;
 }
 
+FogParams fog_params(const LevelView& level, const InstanceRecord& instance, uint32_t voxel) {
+  FogParams params;
+  params.albedo = level.voxel_albedo.empty() ? level.header.fog_albedo : unpack_albedo(level.voxel_albedo[voxel]);
+  params.self_shadowing = unorm_at(level.voxel_self_shadowing, voxel);
+  params.anisotropy = level.header.fog_anisotropy;
+  if (!level.voxel_anisotropy.empty()) {  // of all that the voxel scatters, so nothing is left to tell apart
+    params.anisotropy = unpack_anisotropy(level.voxel_anisotropy[voxel]);
+    params.albedo = cluster_albedo(params.albedo, std::exchange(params.self_shadowing, 1.0f));
+  }
+  params.has_shape = !level.voxel_sggx.empty();
+  if (params.has_shape) params.sggx = to_world(unpack(level.voxel_sggx[voxel]), ScaledInverse(instance));
+  return params;
+}
+
 /// The distance along the normal that clears all rounding of a hit. The transform's translation is no longer than the
 /// way to the hit and the size of the asset, in the world, together.
 float ray_offset(const InstanceRecord& instance, const vec3& origin, const vec3& position, const Box3& local_bounds) {
@@ -265,6 +280,16 @@ Interaction make_interaction(const HitLevels& levels, const InstanceRecord& inst
   interaction.lambda = hit.lambda;
   interaction.uv = glm::vec2(NAN);
 
+  if (hit.is_volume && view.header.medium == Medium::Fog) {
+    interaction.kind = Interaction::Kind::Volume;
+    const FogParams params = fog_params(view, instance, hit.element);
+    interaction.albedo = cluster_albedo(params.albedo, params.self_shadowing);
+    interaction.reflectance.diffuse = params.albedo;
+    interaction.reflectance.anisotropy = params.anisotropy;
+    interaction.reflectance.self_shadowing = params.self_shadowing;
+    InteractionModel::put(interaction, InteractionModel(FogPhase(params, interaction.wo)));
+    return interaction;
+  }
   if (hit.is_volume) {
     interaction.kind = Interaction::Kind::Volume;
     const FlakeParams params = flake_params(view, instance, hit.element);
@@ -299,7 +324,7 @@ vec3 Interaction::ray_origin(const vec3& wi) const {
 ScatterSample Interaction::sample(Rng& rng) const {
   if (kind == Kind::None) return {};
   const InteractionModel& model = InteractionModel::of(*this);
-  if (kind == Kind::Volume) return model.flakes.sample(rng);
+  if (kind == Kind::Volume) return model.is_fog ? model.fog.sample(rng) : model.flakes.sample(rng);
   const HorizonLobe& horizon = model.horizon;
   if (!(horizon.chance > 0)) return model.surface.sample(rng);
   ScatterSample sample;
@@ -318,7 +343,7 @@ ScatterSample Interaction::sample(Rng& rng) const {
 glm::vec3 Interaction::eval(const glm::vec3& wi, Rng& rng) const {
   if (kind == Kind::None) return vec3(0.0f);
   const InteractionModel& model = InteractionModel::of(*this);
-  if (kind == Kind::Volume) return model.flakes.eval(wi, rng);
+  if (kind == Kind::Volume) return model.is_fog ? model.fog.eval(wi, rng) : model.flakes.eval(wi, rng);
   const vec3 value = is_on_one_side(*this, wi) ? model.surface.eval(wi) : vec3(0.0f);
   return model.horizon.chance > 0 ? value + model.horizon.eval(wi) : value;
 }
@@ -326,7 +351,7 @@ glm::vec3 Interaction::eval(const glm::vec3& wi, Rng& rng) const {
 float Interaction::pdf(const glm::vec3& wi) const {
   if (kind == Kind::None) return 0.0f;
   const InteractionModel& model = InteractionModel::of(*this);
-  if (kind == Kind::Volume) return model.flakes.pdf(wi);
+  if (kind == Kind::Volume) return model.is_fog ? model.fog.pdf(wi) : model.flakes.pdf(wi);
   const float chance = model.horizon.chance;
   const float density = (1 - chance) * model.surface.pdf(wi);
   return chance > 0 ? density + chance * model.horizon.pdf(wi) : density;

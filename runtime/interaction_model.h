@@ -7,6 +7,7 @@
 #include "bvh/traced_morph.h"
 #include "farfield/interaction.h"
 #include "scattering/flake_phase.h"
+#include "scattering/fog_phase.h"
 #include "scattering/horizon_lobe.h"
 #include "scattering/surface_bsdf.h"
 
@@ -32,14 +33,17 @@ namespace detail {
 struct InteractionModel {
   union {
     SurfaceBsdf surface;  ///< Kind::Surface
-    FlakePhase flakes;    ///< Kind::Volume
+    FlakePhase flakes;    ///< Kind::Volume, of flakes
+    FogPhase fog;         ///< Kind::Volume, of fog
   };
   HorizonLobe horizon;  ///< Kind::Surface
+  bool is_fog = false;  ///< which of the two, in volumes
   float offset = 0;     ///< how far off the surface rays start, world units
 
   InteractionModel(const SurfaceBsdf& bsdf, const HorizonLobe& lobe, float ray_offset)
       : surface(bsdf), horizon(lobe), offset(ray_offset) {}
   explicit InteractionModel(const FlakePhase& phase) : flakes(phase) {}
+  explicit InteractionModel(const FogPhase& phase) : fog(phase), is_fog(true) {}
 
   static const InteractionModel& of(const Interaction& interaction);
   static void put(Interaction& interaction, const InteractionModel& model);

@@ -139,8 +139,8 @@ Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folde
   asset->name = folder.filename().string();
   asset->folder = folder;
   asset->origin = manifest.origin;
-  asset->bounds_source = {vec3(manifest.origin + dvec3(manifest.bounds.lower)),
-                          vec3(manifest.origin + dvec3(manifest.bounds.upper))};
+  asset->rotation = manifest.rotation;
+  asset->bounds_source = in_source_space(manifest.bounds, manifest);
   TracedAsset& traced = asset->traced;
   traced.bounds = padded_bounds(manifest.bounds);
   traced.hull.assign(manifest.hull.begin(), manifest.hull.end());

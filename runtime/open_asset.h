@@ -36,6 +36,7 @@ struct OpenAsset {
   std::string name;              ///< of its folder, for messages
   std::filesystem::path folder;  ///< canonical
   dvec3 origin{0.0};             ///< of local space in the source's space
+  glm::dmat3 rotation{1.0};      ///< of local space there
   Box3 bounds_source;            ///< in the source's space
   TracedAsset traced;
   std::unique_ptr<CloseUp> close_up;  ///< of level 0

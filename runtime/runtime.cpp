@@ -29,10 +29,15 @@ Result<void> check_options(const RuntimeOptions& options) {
   return {};
 }
 
-/// M after a translation by `origin`, in double: both may be far from zero and cancel.
-mat4x3 with_origin(const mat4x3& m, const dvec3& origin) {
+/// M after a translation by `origin`, in double: both may be far from zero and cancel. Before that, a rotation.
+mat4x3 with_origin(const mat4x3& m, const dvec3& origin, const glm::dmat3& rotation) {
+  const glm::dmat3 linear{dvec3(m[0]), dvec3(m[1]), dvec3(m[2])};
   mat4x3 result = m;
-  result[3] = vec3(dvec3(m[3]) + glm::dmat3(dvec3(m[0]), dvec3(m[1]), dvec3(m[2])) * origin);
+  if (rotation != glm::dmat3(1.0)) {
+    const glm::dmat3 turned = linear * rotation;
+    result = mat4x3(vec3(turned[0]), vec3(turned[1]), vec3(turned[2]), m[3]);
+  }
+  result[3] = vec3(dvec3(m[3]) + linear * origin);
   return result;
 }
 
@@ -165,7 +170,8 @@ void Runtime::bounds(AssetId asset, glm::vec3& lower, glm::vec3& upper) const {
 }
 
 Result<InstanceRecord> Runtime::Impl::make_record(uint32_t asset, const mat4x3& local_to_world) const {
-  FARFIELD_TRY_LET(auto record, make_instance(asset, with_origin(local_to_world, levels.asset(asset).origin)));
+  const OpenAsset& opened = levels.asset(asset);
+  FARFIELD_TRY_LET(auto record, make_instance(asset, with_origin(local_to_world, opened.origin, opened.rotation)));
   record.footprint.world_to_r0 = options.pixel_error / largest_stretch(local_to_world);
   if (asset < asset_limits.size()) record.limits = asset_limits[asset];
   return record;

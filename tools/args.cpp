@@ -70,6 +70,24 @@ Result<Part> parse_part(std::string_view text) {
   return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a part such as 0/8 to 7/8", text));
 }
 
+Result<std::optional<vec3>> parse_albedo(std::string_view text) {
+  vec3 albedo(0.0f);
+  int count = 0;
+  for (std::string_view rest = text; count < 3; ++count) {
+    const size_t comma = std::min(rest.find(','), rest.size());
+    const auto [end, error] = std::from_chars(rest.data(), rest.data() + comma, albedo[count]);
+    if (error != std::errc() || end != rest.data() + comma || !(albedo[count] >= 0 && albedo[count] <= 1)) break;
+    if (comma == rest.size()) {
+      if (count == 0) return vec3(albedo.x);
+      if (count == 2) return albedo;
+      break;
+    }
+    rest.remove_prefix(comma + 1);
+  }
+  return make_error(ErrorCode::InvalidArgument,
+                    fmt::format("\"{}\" is not one number in [0, 1], or three with commas between them", text));
+}
+
 tl::unexpected<Error> is_there_twice(std::string_view value) {
   return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is there twice", value));
 }

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 #include <vector>
 
 #include "base/result.h"
+#include "base/vec.h"
 
 namespace farfield::tool {
 
@@ -49,6 +51,9 @@ Result<std::vector<T>> parse_list(std::string_view text, Result<T> (*parse)(std:
     text.remove_prefix(comma + 1);
   }
 }
+
+/// Reads "0.9" or "0.9,0.8,0.7"; each in [0, 1]. Errors: InvalidArgument.
+Result<std::optional<vec3>> parse_albedo(std::string_view text);
 
 struct LevelRange {
   uint32_t first = 0, last = 0;

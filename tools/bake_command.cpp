@@ -13,6 +13,7 @@
 #include "tools/commands.h"
 #include "tools/console.h"
 #include "tools/flags.h"
+#include "tools/fog_flags.h"
 #include "tools/interrupt.h"
 #include "tools/progress.h"
 #include "tools/report_json.h"
@@ -72,7 +73,8 @@ Result<void> bake_scene(const BakeArguments& arguments) {
   options.coarsest_grid = arguments.options.coarsest_grid;
   options.rays_per_voxel = arguments.options.rays_per_voxel;
   options.source_only = arguments.options.source_only;
-  options.assemblies = arguments.assemblies;
+  options.read = {arguments.assemblies, arguments.options.import.fog};
+  options.downsampling = arguments.options.downsampling;
   options.part = arguments.part.number;
   options.part_count = arguments.part.count;
   options.job = arguments.options.job;
@@ -136,14 +138,14 @@ void add_bake_command(CLI::App& app, Action& action) {
   auto arguments = std::make_shared<BakeArguments>();
   BakeOptions& options = arguments->options;
   CLI::App* command =
-      app.add_subcommand("bake", "Bake a model to a folder of levels; goes on where an interrupted bake stopped");
-  command->add_option("source", arguments->source, "Model: OBJ, PLY, glTF or glb, gzipped or not")
+      app.add_subcommand("bake", "Bake a model or a volume to a folder of levels; goes on where an interrupted bake stopped");
+  command->add_option("source", arguments->source, "Model: OBJ, PLY, glTF or glb, gzipped or not. Volume: OpenVDB (.vdb)")
       ->required()
       ->check(is_named);
   command->add_option("-o,--output", arguments->output, "Folder to write, by convention NAME.farfield")
       ->required()
       ->check(is_named);
-  command->add_option("--finest-grid", options.finest_grid, "Voxels along the longest side of level 1, a power of two")
+  command->add_option("--finest-grid", options.finest_grid, "Voxels along the longest side of level 1, a power of two; of models, a volume's grid is its own")
       ->capture_default_str();
   command->add_option("--coarsest-grid", options.coarsest_grid, "The same of the last level, the root")
       ->capture_default_str();
@@ -171,6 +173,8 @@ void add_bake_command(CLI::App& app, Action& action) {
       ->default_str("0/1")
       ->needs(scene);
   command->add_option("--parent", arguments->parent, "Process to end with")->group("");  // for render and shot
+  add_fog_flags(command, options.import.fog);
+  add_downsampling_flag(command, options.downsampling);
   command->add_flag("--source-only", options.source_only, "Write level 0 only: the source, ready to render");
   command->add_option("--threads", arguments->threads, "0: as many as the machine has")
       ->check(CLI::Range(0, 4096))
@@ -178,7 +182,9 @@ void add_bake_command(CLI::App& app, Action& action) {
   command->add_flag("!--no-warnings", arguments->warnings,
                     "Leave what was ignored or guessed to the manifest, as render does, which says it itself");
   command->add_option("--report", arguments->report, "Write what was done, with seconds per stage, as JSON");
-  command->footer("Example:\n  farfield bake oak.obj.gz -o oak.farfield --finest-grid 512");
+  command->footer(
+      "Example:\n  farfield bake oak.obj.gz -o oak.farfield --finest-grid 512\n"
+      "  farfield bake cloud.vdb -o cloud.farfield --density-scale 20 --albedo 0.999 --anisotropy 0.8");
   command->callback([arguments, &action] { action = [arguments] { return run_bake(*arguments); }; });
 }
 

@@ -12,6 +12,7 @@
 #include "tools/commands.h"
 #include "tools/console.h"
 #include "tools/flags.h"
+#include "tools/fog_flags.h"
 #include "tools/interrupt.h"
 #include "tools/progress.h"
 
@@ -110,6 +111,7 @@ void add_evaluate_command(CLI::App& app, Action& action) {
   command->add_option("--node", options.import.node, "glTF: the node that was baked with all below it")
       ->check(CLI::Range(0, 1 << 30))
       ->excludes(mesh);
+  add_fog_flags(command, options.import.fog);
   command->add_flag("--other-source", options.other_source,
                     "Compare with a model that it was not baked from, too; then no errors are kept");
   add_parsed_option(command, "--levels", arguments->levels, parse_level_range,

@@ -6,13 +6,16 @@
 #include "base/result.h"
 #include "cache/manifest.h"
 #include "evaluate/source_summary.h"
+#include "import/read_volume.h"
 #include "tools/commands.h"
 #include "tools/console.h"
 #include "tools/flags.h"
+#include "tools/fog_flags.h"
 #include "tools/info_text.h"
 #include "tools/interrupt.h"
 #include "tools/progress.h"
 #include "tools/source_text.h"
+#include "tools/volume_text.h"
 
 namespace farfield::tool {
 namespace {
@@ -45,11 +48,18 @@ Result<void> info_of_source(const InfoArguments& arguments) {
   return {};
 }
 
+Result<void> info_of_volume(const InfoArguments& arguments) {
+  FARFIELD_TRY_LET(const auto volume, read_volume(arguments.path, arguments.import.fog));
+  if (arguments.as_json || !stdout_is_terminal()) print_warnings("info", volume.warnings);
+  fmt::print("{}", arguments.as_json ? volume_json(arguments.path, volume) : volume_table(arguments.path, volume));
+  return {};
+}
+
 /// What is baked is a folder; a file is what one bakes from.
 Result<void> run_info(const InfoArguments& arguments) {
   std::error_code ignored;  // what cannot be looked at is refused with the file's name by info_of_asset()
-  return std::filesystem::is_regular_file(arguments.path, ignored) ? info_of_source(arguments)
-                                                                   : info_of_asset(arguments);
+  if (!std::filesystem::is_regular_file(arguments.path, ignored)) return info_of_asset(arguments);
+  return is_volume_file(arguments.path) ? info_of_volume(arguments) : info_of_source(arguments);
 }
 
 }  // namespace
@@ -59,7 +69,7 @@ void add_info_command(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand(
       "info",
       "Show what the levels of a baked asset hold, cost and miss, or what is understood of a model before a bake");
-  command->add_option("path", arguments->path, "Baked folder, or a model: OBJ, PLY, glTF or glb, gzipped or not")
+  command->add_option("path", arguments->path, "Baked folder, or a model: OBJ, PLY, glTF or glb, gzipped or not; or a volume: .vdb")
       ->required()
       ->check(is_named);
   CLI::Option* mesh = command->add_option("--mesh", arguments->import.mesh, "glTF model: only this mesh, as for bake")
@@ -67,6 +77,7 @@ void add_info_command(CLI::App& app, Action& action) {
   command->add_option("--node", arguments->import.node, "glTF model: only this node and those below it, as for bake")
       ->check(CLI::Range(0, 1 << 30))
       ->excludes(mesh);
+  add_fog_flags(command, arguments->import.fog);
   command->add_flag("--json", arguments->as_json, "Print JSON");
   command->footer("Example:\n  farfield info oak.farfield\n  farfield info oak.obj.gz");
   command->callback([arguments, &action] { action = [arguments] { return run_info(*arguments); }; });

@@ -13,6 +13,7 @@
 #include "tools/args.h"
 #include "tools/console.h"
 #include "tools/flags.h"
+#include "tools/fog_flags.h"
 #include "tools/interrupt.h"
 #include "tools/progress.h"
 
@@ -30,7 +31,7 @@ Result<Blend> parse_blend(const std::string& text) {
 
 void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std::string& output_help) {
   RenderOptions& options = arguments.options;
-  command->add_option("scene", arguments.scene, "glTF scene: .glb or .gltf")->required()->check(is_named);
+  command->add_option("scene", arguments.scene, "glTF scene: .glb or .gltf; or an OpenVDB volume: .vdb")->required()->check(is_named);
   command->add_option("-o,--output", arguments.output, output_help)->required()->check(is_named);
   const auto set_size = [&options](const std::string& text) {
     const auto size = parse_pixel_size(text);
@@ -96,6 +97,8 @@ void add_level_flags(CLI::App* command, RenderOptions& options) {
   add_parsed_option(command, "--finest-grid", options.finest_grid, parse_finest_grid,
                     "Of assets that have to be baked, a power of two")
       ->default_str(fmt::format("{}", options.finest_grid));
+  add_fog_flags(command, options.fog);
+  add_downsampling_flag(command, options.downsampling);
   add_parsed_option(command, "--rays-per-voxel", options.rays_per_voxel, parse_rays_per_voxel,
                     "Of assets that have to be baked: what each voxel's density is measured with")
       ->default_str(fmt::format("{}", options.rays_per_voxel));

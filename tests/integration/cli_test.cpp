@@ -13,6 +13,7 @@
 #include "tests/support/png_files.h"
 #include "tests/support/small_assets.h"
 #include "tests/support/subprocess.h"
+#include "tests/support/vdb_files.h"
 
 namespace farfield {
 namespace {
@@ -508,6 +509,67 @@ TEST_F(WholeRoad, RenderAndShotOfAScene) {
   EXPECT_TRUE(std::ranges::all_of(fs::directory_iterator(path("assets/scene")),
                                   [&](const auto& entry) { return is_source(entry.path().filename()); }));
   EXPECT_EQ(contents(path("frame.exr")), of_whole_asset);
+}
+
+/// A ball of fog, 16 voxels wide, about the origin.
+void write_fog_ball(const fs::path& path) {
+  test::VdbGrid grid;
+  grid.index_to_source = glm::dmat4(glm::dmat3(0.125));
+  grid.voxels = test::filled_cube({-8, -8, -8}, 17, [](const ivec3& v) {
+    return std::max(0.0, 8 - glm::length(dvec3(v) - 8.0));
+  });
+  test::write_vdb(path, {grid});
+}
+
+TEST_F(WholeRoad, AVolumeIsBakedJudgedAndRendered) {
+  write_fog_ball(path("ball.vdb"));
+  const std::vector<std::string> fog = {"--density-scale", "2", "--albedo", "0.9,0.8,0.7", "--anisotropy=-0.3"};
+  const auto run = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), fog.begin(), fog.end());
+    expect_quiet_success(farfield(arguments));
+  };
+  const ProcessOutput source = farfield({"info", path("ball.vdb"), "--albedo", "1"});
+  EXPECT_NE(source.out.find("voxels with a density in 15 x 15 x 15"), std::string::npos) << source.out;
+  EXPECT_EQ(Json::parse(farfield({"info", path("ball.vdb"), "--json"}).out)["dims"], Json({15, 15, 15}));
+  run({"bake", path("ball.vdb"), "-o", path("ball.farfield"), "--coarsest-grid", "4"});
+  expect_quiet_success(farfield({"verify", path("ball.farfield")}));
+  const ProcessOutput info = farfield({"info", path("ball.farfield")});
+  EXPECT_NE(info.out.find("15^3"), std::string::npos) << info.out;
+  run({"evaluate", path("ball.farfield"), "--source", path("ball.vdb"), "--views", "1", "--spp", "4", "--lights",
+       "daylight", "--json", path("ball.json")});
+  EXPECT_EQ(Json::parse(contents(path("ball.json")))["levels"].size(), 1u);  // 4^3 voxels save no page against 8^3
+  run({"render", path("ball.vdb"), "--assets", path("fog_assets"), "--size", "24x16", "--spp", "4", "-o",
+       path("ball.exr")});
+  EXPECT_TRUE(fs::exists(path("fog_assets/ball/ball.farfield/manifest.json")));
+  EXPECT_GT(fs::file_size(path("ball.exr")), 1000u);
+}
+
+TEST_F(WholeRoad, AVolumeStandsInASceneOfMeshes) {
+  write_fog_ball(path("ball.vdb"));
+  test::write_bush_scene(path("scene.gltf"), 120);
+  Json scene = Json::parse(contents(path("scene.gltf")));
+  scene["nodes"].push_back({{"name", "fog"},
+                            {"translation", {0, 1.5, 2}},
+                            {"extras", {{"farfield_volume", {{"file", "ball.vdb"}, {"albedo", {1, 0.2, 0.2}}}}}}});
+  scene["scenes"][0]["nodes"].push_back(scene["nodes"].size() - 1);
+  std::ofstream(path("foggy.gltf")) << scene;
+  const std::vector<std::string> common = {"--finest-grid", "16", "--size", "48x32", "--spp", "8", "--assets",
+                                           path("foggy_assets")};
+  const auto render = [&](const std::string& file, const std::string& out) {
+    std::vector<std::string> arguments = {"render", path(file), "-o", path(out)};
+    arguments.insert(arguments.end(), common.begin(), common.end());
+    expect_quiet_success(farfield(arguments));
+  };
+  render("foggy.gltf", "foggy.exr");
+  EXPECT_TRUE(fs::exists(path("foggy_assets/foggy/ball.farfield/manifest.json")));
+  EXPECT_TRUE(fs::exists(path("foggy_assets/foggy/bush.farfield/manifest.json")));
+  render("scene.gltf", "clear.exr");
+  EXPECT_NE(contents(path("foggy.png")), contents(path("clear.png")));
+  fs::remove(path("ball.vdb"));  // the picture is without it, and says so
+  const ProcessOutput without = farfield({"render", path("foggy.gltf"), "-o", path("without.exr"), "--size", "48x32",
+                                          "--spp", "8", "--assets", path("foggy_assets"), "--finest-grid", "16"});
+  EXPECT_EQ(without.exit_code, 0);
+  EXPECT_NE(without.err.find("its volume is left out"), std::string::npos) << without.err;
 }
 
 /// Two settings of a scene's bush against full detail, small and fast.

@@ -258,6 +258,19 @@ LevelData full_level_of_version_5() {
   return level;
 }
 
+LevelData full_level_of_version_6() {
+  LevelData level = full_level_of_version_2();
+  for (auto* flakes : {&level.voxel_diffuse, &level.voxel_specular, &level.voxel_transmission}) flakes->clear();
+  level.voxel_roughness2.clear();
+  level.voxel_emission.clear();
+  level.voxel_albedo = counted<PackedAlbedo>(5, 19);
+  level.voxel_anisotropy = {-124, -1, 0, 1, 124};
+  level.header.medium = Medium::Fog;
+  level.header.fog_albedo = {0.25f, 0.5f, 1.0f};
+  level.header.fog_anisotropy = -0.75f;
+  return level;
+}
+
 LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks) {
   Rng rng(seed);
   LevelData level;

@@ -63,6 +63,9 @@ LevelData full_level_of_version_4();
 /// And of the fifth.
 LevelData full_level_of_version_5();
 
+/// The same with fog instead of flakes, and all that only fog has.
+LevelData full_level_of_version_6();
+
 /// A random sound level: `quads` quads, `bricks` bricks, channels picked by the seed.
 LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks);
 

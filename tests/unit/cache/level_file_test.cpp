@@ -36,6 +36,9 @@ void expect_same(const LevelView& a, const LevelView& b) {
   EXPECT_EQ(a.header.volume_origin, b.header.volume_origin);
   EXPECT_EQ(a.header.hot_spot, b.header.hot_spot);
   EXPECT_EQ(a.header.open_side, b.header.open_side);
+  EXPECT_EQ(a.header.medium, b.header.medium);
+  EXPECT_EQ(a.header.fog_albedo, b.header.fog_albedo);
+  EXPECT_EQ(a.header.fog_anisotropy, b.header.fog_anisotropy);
   EXPECT_EQ(a.header.highlight_lean, b.header.highlight_lean);
   std::vector<std::span<const std::byte>> sections;
   for_each_section(a, [&](SectionId, const auto& array) { sections.push_back(std::as_bytes(array)); });
@@ -216,6 +219,27 @@ TEST(LevelFormat, GoldenBytesOfVersion5AreFrozen) {
   expect_frozen("/format_v5/level_3.ffl", 4416u, test::full_level_of_version_5());
 }
 
+TEST(LevelFormat, GoldenBytesOfVersion6AreFrozen) {
+  expect_frozen("/format_v6/level_3.ffl", 3840u, test::full_level_of_version_6());
+}
+
+TEST(LevelFormat, FogHasNothingOfFlakesAndFlakesNothingOfFog) {
+  const auto problem = [](const std::function<void(LevelData&)>& spoil) {
+    LevelData level = test::full_level_of_version_6();
+    spoil(level);
+    const auto in_structure = find_structure_problem(view_of(level));
+    return in_structure ? *in_structure : find_value_problem(view_of(level)).value_or("");
+  };
+  EXPECT_EQ(problem([](LevelData&) {}), "");
+  EXPECT_EQ(problem([](LevelData& l) { l.voxel_diffuse.resize(5); }), "its fog has properties of flakes");
+  EXPECT_EQ(problem([](LevelData& l) { l.header.medium = Medium::Flakes; }), "it has properties of fog, and no fog");
+  EXPECT_EQ(problem([](LevelData& l) { l.header.fog_albedo.y = 1.5f; }), "the fog's albedo is (0.25, 1.5, 1)");
+  EXPECT_EQ(problem([](LevelData& l) { l.header.fog_albedo.y = NAN; }), "the fog's albedo is (0.25, nan, 1)");
+  EXPECT_EQ(problem([](LevelData& l) { l.header.fog_anisotropy = 1; }), "the fog's anisotropy is 1");
+  EXPECT_EQ(problem([](LevelData& l) { l.voxel_anisotropy[2] = -128; }), "voxel_anisotropy[2] is -128");
+  EXPECT_EQ(problem([](LevelData& l) { l.voxel_albedo.pop_back(); }), "voxel_albedo has 4 elements for 5 voxels");
+}
+
 TEST(LevelFormat, OctantsMustBelongToVoxels) {
   LevelData level = test::full_level_of_version_4();
   level.voxel_octants.pop_back();
@@ -357,11 +381,12 @@ TEST(HostileLevelFile, HeaderAndTableFieldsAreChecked) {
   const std::vector<Case> cases = {
       {"does not start as a level file", [](auto& h, auto*) { h.magic[1] = 'X'; }},
       {"the format version is 0", [](auto& h, auto*) { h.version = 0; }},
-      {"level format 6, and this Farfield reads up to 5", [](auto& h, auto*) { h.version = 6; },
+      {"level format 7, and this Farfield reads up to 6", [](auto& h, auto*) { h.version = 7; },
        ErrorCode::Unsupported},
       {"the header says", [](auto& h, auto*) { h.file_bytes = kHuge; }},
       {"sections leaves the file", [](auto& h, auto*) { h.section_count = 0xffffffffu; }},
-      {"reserved bytes", [](auto& h, auto*) { h.reserved[19] = 1; }},
+      {"the medium is number 2", [](auto& h, auto*) { h.medium = 2; }},
+      {"it has properties of fog, and no fog", [](auto& h, auto*) { h.fog_anisotropy = 0.5f; }},
       {"the hot spot's strength is -0.1", [](auto& h, auto*) { h.hot_spot = -0.1f; }},
       {"the hot spot's strength is 0.71", [](auto& h, auto*) { h.hot_spot = 0.71f; }},
       {"the open side is (0, 0.6, 0)",

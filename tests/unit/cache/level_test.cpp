@@ -96,8 +96,25 @@ TEST(Brick, PayloadIndicesOfTheActiveVoxelsCountUp) {
   EXPECT_EQ(voxel_count(level), expected);
 }
 
+TEST(PackedAlbedo, IsFineAtBothEnds) {
+  EXPECT_EQ(unpack_albedo(pack_albedo(vec3(0, 1, 0))), vec3(0, 1, 0));
+  for (const float a : {0.01f, 0.1f, 0.5f, 0.9f, 0.99f, 0.999f, 0.9999f}) {
+    const float unpacked = unpack_albedo(pack_albedo(vec3(a))).x;
+    EXPECT_NEAR(unpacked, a, 0.0035f * 2 * std::sqrt(a * (1 - a)) + 1.5e-5f) << a;  // half a step of the angle
+  }
+  EXPECT_EQ(pack_albedo(vec3(NAN, -1, 2)), pack_albedo(vec3(0, 0, 1)));
+}
+
+TEST(PackedAnisotropy, IsWithinItsStepAndItsBounds) {
+  for (const float g : {-0.98f, -0.3f, 0.0f, 0.004f, 0.85f}) EXPECT_NEAR(unpack_anisotropy(pack_anisotropy(g)), g, 0.5f / 127);
+  EXPECT_EQ(pack_anisotropy(NAN), 0);
+  EXPECT_LE(unpack_anisotropy(pack_anisotropy(5)), 0.98f);
+}
+
 TEST(LevelView, ShowsEveryArrayOfItsLevel) {
-  const LevelData level = test::full_level_of_version_4();
+  LevelData level = test::full_level_of_version_4();
+  level.voxel_albedo = test::full_level_of_version_6().voxel_albedo;  // which no valid level has beside flakes
+  level.voxel_anisotropy = test::full_level_of_version_6().voxel_anisotropy;
   const LevelView view = view_of(level);
   std::vector<std::span<const std::byte>> owned, seen;
   for_each_section(level, [&](SectionId, const auto& array) { owned.push_back(std::as_bytes(std::span(array))); });
@@ -124,7 +141,7 @@ TEST(SectionName, IsDifferentForEachSection) {
   std::set<std::string_view> names;
   const LevelView view;
   for_each_section(view, [&](SectionId id, const auto&) { names.insert(section_name(id)); });
-  EXPECT_EQ(names.size(), 29u);
+  EXPECT_EQ(names.size(), 31u);
   EXPECT_FALSE(names.contains(section_name(SectionId{0})));
 }
 

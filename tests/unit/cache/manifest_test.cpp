@@ -31,6 +31,7 @@ TEST(Manifest, GivesBackWhatWasWritten) {
   EXPECT_EQ(read->source_files, manifest.source_files);
   EXPECT_EQ(read->warnings, manifest.warnings);
   EXPECT_EQ(read->origin, manifest.origin);
+  EXPECT_EQ(read->rotation, manifest.rotation);
   EXPECT_EQ(read->bounds.lower, manifest.bounds.lower);
   EXPECT_EQ(read->bounds.upper, manifest.bounds.upper);
   EXPECT_EQ(read->hull, manifest.hull);
@@ -54,6 +55,7 @@ TEST(Manifest, ExtremeValuesSurvive) {
   manifest.source_files = std::vector<HashedFile>{{"a/b.mtl", 1}, {"../c \"d\".png", 0}};
   manifest.warnings = {"one", "two\n"};
   manifest.origin = {1e300, -1e-300, 0.1};
+  manifest.rotation = glm::dmat3(dvec3(0.6, 0.8, 0), dvec3(-0.8, 0.6, 0), dvec3(0, 0, -1));
   manifest.hull = {{1e-45f, 3.4e38f, 0.1f}};
   manifest.levels.resize(1);
   manifest.levels[0].file_bytes = uint64_t{1} << 50;
@@ -250,6 +252,8 @@ TEST(HostileManifest, ValuesThatMakeNoSenseAreNeitherReadNorWritten) {
   const std::vector<ManifestCase> not_even_json = {
       {"the bounds are empty or not finite", [](auto& m) { m.bounds = Box3(); }},
       {"the origin is not finite", [=](auto& m) { m.origin.z = kNan; }},
+      {"the rotation is none", [=](auto& m) { m.rotation[1].y = kNan; }},
+      {"the rotation is none", [=](auto& m) { m.rotation *= 1.1; }},
       {"base_resolution is not positive", [=](auto& m) { m.base_resolution = kNan; }},
       {"a hull point is not finite", [=](auto& m) { m.hull[1].y = static_cast<float>(kNan); }},
       {"its ray_cost is negative", [](auto& m) { m.levels[1].ray_cost = -1; }},

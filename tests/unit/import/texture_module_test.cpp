@@ -6,6 +6,7 @@
 
 #include <thread>
 
+#include "base/module_loader.h"
 #include "import/texture.h"
 #include "tests/support/files.h"
 #include "tests/support/png_files.h"
@@ -44,15 +45,15 @@ TEST(TextureModule, ALibraryWithoutTheEntryIsOfAnotherVersion) {
 }
 
 TEST(TextureModule, TheBuildTreeHasItWhereItIsLookedFor) {
-  const std::vector<fs::path> folders = texture_module_folders();
+  const std::vector<fs::path> folders = module_folders();
   EXPECT_NE(std::find(folders.begin(), folders.end(), fs::path(FARFIELD_TEXTURE_MODULE_FOLDER)), folders.end());
 }
 
 TEST(TextureModule, TheVariableReplacesThePlaces) {
   setenv("FARFIELD_MODULE_DIR", "/some/where", 1);
-  EXPECT_EQ(texture_module_folders(), std::vector<fs::path>{"/some/where"});
+  EXPECT_EQ(module_folders(), std::vector<fs::path>{"/some/where"});
   setenv("FARFIELD_MODULE_DIR", "", 1);
-  EXPECT_GT(texture_module_folders().size(), 1u);
+  EXPECT_GT(module_folders().size(), 1u);
   unsetenv("FARFIELD_MODULE_DIR");
 }
 

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reading OpenVDB files (.vdb): the density of a fog volume, with albedos if there are any.
+//
+// Grids: density is "density", or the only float grid that is a fog volume, or what the options name; float, half and
+// double. Albedos are a vec3 grid "albedo" or "Cd" on the same lattice. Emission (temperature, heat, flame, fire) is
+// not modelled: as a density it is refused, beside one it is ignored and said to be. What else is there is ignored, and
+// said to be, too.
+//
+// OpenVDB's voxel (i, j, k) is a sample whose *centre* is where its transform puts (i, j, k): half a voxel is
+// subtracted once, here.
+#pragma once
+
+#include <filesystem>
+
+#include "base/job.h"
+#include "base/result.h"
+#include "import/source_volume.h"
+#include "import/fog_options.h"
+
+namespace farfield {
+
+/// Whether a file is one of those, by its first bytes or, if it cannot be opened, by its name.
+bool is_volume_file(const std::filesystem::path& path);
+
+/// Bounds of what a file's grid may hold, in the source's space, from its header alone.
+struct VolumeExtent {
+  dvec3 lower{0.0}, upper{0.0};
+};
+/// Errors: those of read_volume(), as far as the header tells.
+Result<VolumeExtent> read_volume_extent(const std::filesystem::path& path, const FogOptions& options = {});
+
+/// Memory: 2 KiB for each 8^3 voxels that hold any density (tiles share theirs), 4 bytes for each that the bounds
+/// enclose, and OpenVDB's own tree while it is read. Errors: NotFound, Io; BadFile (broken; densities that are negative
+/// by more than rounding, NaN or infinite: with the first such voxel; nothing with a density); Unsupported (no such
+/// grid, several to choose from, level sets without the option, voxels that are not cubes, emission, more voxels or a
+/// larger extent than a level can hold); InvalidArgument (options); Cancelled.
+Result<SourceVolume> read_volume(const std::filesystem::path& path, const FogOptions& options = {},
+                                 const Job& job = {});
+
+/// The source_hash that read_volume() would give. Errors: those of reading the file.
+Result<uint64_t> hash_volume(const std::filesystem::path& path, const FogOptions& options);
+
+}  // namespace farfield

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// A scattering medium as its file has it: a sparse grid of densities, with albedos where they vary. What the reader of
+// OpenVDB files makes and what volumes are baked from; it knows nothing of OpenVDB.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/vec.h"
+
+namespace farfield {
+
+inline constexpr int kVolumeBrickSide = 8;          ///< as cache/level.h has it
+inline constexpr int kVolumeBrickVoxels = 512;      ///< x fastest, then y, then z
+inline constexpr uint32_t kEmptyBrick = 0xffffffffu;
+
+/// sigma_t of 8^3 voxels in 1 / scene unit, finite and >= 0.
+using DensityBrick = std::array<float, kVolumeBrickVoxels>;
+/// Single-scattering albedos of 8^3 voxels, linear RGB: 65535 is 1.
+using AlbedoBrick = std::array<std::array<uint16_t, 3>, kVolumeBrickVoxels>;
+inline vec3 unpack_albedo(const std::array<uint16_t, 3>& a) { return vec3(a[0], a[1], a[2]) * (1.0f / 65535.0f); }
+
+/// Densities of a sparse grid, in bricks. Voxel (i, j, k) is the cube voxel_size * [i, i + 1] x [j, j + 1] x [k, k + 1].
+struct DensityGrid {
+  double voxel_size = 0;  ///< > 0, scene units
+  ivec3 dims{0};          ///< voxels; the rest of the last bricks is empty
+  ivec3 brick_dims{0};
+  std::vector<uint32_t> brick_table;  ///< x fastest: index into bricks, or kEmptyBrick
+  std::vector<DensityBrick> bricks;   ///< in no particular order
+
+  size_t table_index(const ivec3& brick) const {
+    return static_cast<size_t>(brick.x) +
+           static_cast<size_t>(brick_dims.x) *
+               (static_cast<size_t>(brick.y) + static_cast<size_t>(brick_dims.y) * static_cast<size_t>(brick.z));
+  }
+  /// Index of the brick at these coordinates, in bricks; kEmptyBrick also outside of the grid.
+  uint32_t brick_at(const ivec3& brick) const {
+    for (int axis = 0; axis < 3; ++axis)
+      if (brick[axis] < 0 || brick[axis] >= brick_dims[axis]) return kEmptyBrick;
+    return brick_table[table_index(brick)];
+  }
+};
+
+/// Immutable once read; any thread. Bounds are tight: the first and the last voxel along each axis that have a density
+/// are in it. Bricks may be shared by entries of the table (tiles).
+struct SourceVolume : DensityGrid {
+  dvec3 origin{0.0};         ///< lower corner of voxel (0, 0, 0), in the source's space
+  glm::dmat3 rotation{1.0};  ///< columns: the grid's axes in the source's space; orthonormal, may mirror
+  std::vector<AlbedoBrick> albedos;   ///< none: `albedo` everywhere. Else as many as bricks
+  vec3 albedo{1.0f};                  ///< single scattering, linear RGB in [0, 1]
+  float anisotropy = 0;               ///< g of Henyey and Greenstein
+  uint64_t active_voxels = 0;         ///< with a density
+  uint64_t filled_bricks = 0;         ///< entries of the table that are not kEmptyBrick
+  float densest = 0;                  ///< the largest density
+  std::vector<std::string> warnings;  ///< one line each: what was ignored, guessed or dropped
+  uint64_t source_hash = 0;           ///< of the file's bytes and the options
+};
+
+/// Index of a voxel within its brick.
+inline size_t index_in_brick(const ivec3& voxel) {
+  return static_cast<size_t>((voxel.x & 7) | (voxel.y & 7) << 3 | (voxel.z & 7) << 6);
+}
+
+}  // namespace farfield

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// The border to the module that reads volumes: OpenVDB and the libraries that come with it are for those who have one.
+// Internal to the room.
+#pragma once
+
+#include <string>
+
+#include "base/job.h"
+#include "base/result.h"
+#include "import/read_volume.h"
+
+namespace farfield {
+
+/// What the module exports, under the name kVolumeModuleEntry. All from any thread; errors as read_volume() has them,
+/// but for options, which are right, and without the hash.
+struct VolumeModule {
+  Result<VolumeExtent> (*read_extent)(const std::string& path, const FogOptions& options);
+  Result<SourceVolume> (*read)(const std::string& path, const FogOptions& options, const Job& job);
+};
+
+/// A change of the types above, or of those that they name, takes the next number.
+inline constexpr const char* kVolumeModuleEntry = "farfield_volume_module_1";
+
+}  // namespace farfield

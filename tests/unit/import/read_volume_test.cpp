@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "import/read_volume.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/files.h"
+#include "tests/support/vdb_files.h"
+
+namespace farfield {
+namespace {
+
+namespace fs = std::filesystem;
+using test::VdbGrid;
+
+/// A folder with files of its own for each test.
+class ReadVolume : public testing::Test {
+ protected:
+  fs::path write(const std::vector<VdbGrid>& grids) const {
+    const fs::path path = folder_.path() / "cloud.vdb";
+    test::write_vdb(path, grids);
+    return path;
+  }
+  static SourceVolume read(const fs::path& path, const FogOptions& options = {}) {
+    auto volume = read_volume(path, options);
+    EXPECT_TRUE(volume) << volume.error().message;
+    return volume ? std::move(*volume) : SourceVolume();
+  }
+  /// The message of an error, which names the file.
+  static std::string failure(const fs::path& path, ErrorCode code, const FogOptions& options = {}) {
+    const auto volume = read_volume(path, options);
+    if (volume) return "no error";
+    EXPECT_EQ(volume.error().code, code) << volume.error().message;
+    EXPECT_EQ(volume.error().message.find('\n'), std::string::npos);
+    return volume.error().message;
+  }
+  static bool has_warning(const SourceVolume& volume, const std::string& words) {
+    for (const std::string& warning : volume.warnings)
+      if (warning.find(words) != std::string::npos) return true;
+    return false;
+  }
+
+  const test::TemporaryFolder folder_;
+};
+
+float density_at(const SourceVolume& volume, const ivec3& voxel) {
+  const uint32_t brick = volume.brick_at(voxel / 8);
+  return brick == kEmptyBrick ? 0.0f : volume.bricks[brick][index_in_brick(voxel)];
+}
+
+VdbGrid one_voxel(const ivec3& at = {0, 0, 0}, double value = 1) {
+  VdbGrid grid;
+  grid.voxels = {{at, value}};
+  return grid;
+}
+
+glm::dmat4 scaled(double size) { return glm::dmat4(glm::dmat3(size)); }
+
+void expect_near(const dvec3& a, const dvec3& b, double tolerance) {
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(a[c], b[c], tolerance);
+}
+
+TEST_F(ReadVolume, VoxelsHaveTheirCentresAtWholeNumbers) {
+  VdbGrid grid = one_voxel({3, -2, 5}, 2);
+  grid.index_to_source = scaled(0.5);
+  const SourceVolume volume = read(write({grid}), {.density_scale = 3});
+  expect_near(volume.origin, {1.25, -1.25, 2.25}, 1e-12);
+  EXPECT_EQ(volume.dims, ivec3(1));
+  EXPECT_NEAR(volume.voxel_size, 0.5, 1e-12);
+  EXPECT_EQ(density_at(volume, {0, 0, 0}), 6.0f);
+  EXPECT_EQ(volume.active_voxels, 1u);
+  EXPECT_EQ(volume.densest, 6.0f);
+  const auto extent = read_volume_extent(folder_.path() / "cloud.vdb");
+  ASSERT_TRUE(extent);
+  expect_near(extent->lower, {1.25, -1.25, 2.25}, 1e-12);
+  expect_near(extent->upper, {1.75, -0.75, 2.75}, 1e-12);
+}
+
+TEST_F(ReadVolume, HalfAndDoubleGridsAreFloatGrids) {
+  const auto value = [](const ivec3& v) { return 0.1 + 0.013 * v.x + 0.17 * v.y * v.z; };
+  VdbGrid grid;
+  grid.voxels = test::filled_cube({-3, 1, 7}, 11, value);
+  const SourceVolume as_float = read(write({grid}));
+  for (const auto kind : {VdbGrid::Kind::Half, VdbGrid::Kind::Double}) {
+    grid.kind = kind;
+    const SourceVolume other = read(write({grid}));
+    ASSERT_EQ(other.dims, as_float.dims);
+    EXPECT_EQ(other.active_voxels, as_float.active_voxels);
+    for (const ivec3 voxel : {ivec3(0), ivec3(10), ivec3(3, 9, 2)})
+      EXPECT_NEAR(density_at(other, voxel), value(voxel), 1e-3 * value(voxel));
+  }
+}
+
+TEST_F(ReadVolume, TilesShareTheirBricksAndAreNeverFilledOut) {
+  VdbGrid grid;
+  grid.tiles = {{{-128, 0, 0}, {383, 511, 511}, 0.25}};
+  const SourceVolume volume = read(write({grid}));
+  EXPECT_EQ(volume.dims, ivec3(512));
+  EXPECT_EQ(volume.active_voxels, 512u * 512 * 512);
+  EXPECT_EQ(volume.filled_bricks, 64u * 64 * 64);
+  EXPECT_EQ(volume.bricks.size(), 1u);
+  for (const ivec3 voxel : {ivec3(0), ivec3(511), ivec3(99, 300, 7)}) EXPECT_EQ(density_at(volume, voxel), 0.25f);
+}
+
+TEST_F(ReadVolume, TransformsThatTurnMirrorAndMoveAreKept) {
+  const double angle = 0.7;
+  const glm::dmat3 turn(dvec3(std::cos(angle), std::sin(angle), 0), dvec3(-std::sin(angle), std::cos(angle), 0),
+                        dvec3(0, 0, -1));  // mirrors as well
+  VdbGrid grid = one_voxel({2, 0, 0});
+  grid.voxels.push_back({{4, 3, 9}, 0.5});
+  grid.index_to_source = glm::dmat4(0.25 * turn);
+  grid.index_to_source[3] = glm::dvec4(10, 20, 30, 1);
+  const SourceVolume volume = read(write({grid}));
+  EXPECT_NEAR(volume.voxel_size, 0.25, 1e-12);
+  EXPECT_EQ(volume.dims, ivec3(3, 4, 10));
+  for (int c = 0; c < 3; ++c) expect_near(volume.rotation[c], turn[c], 1e-12);
+  expect_near(volume.origin, dvec3(10, 20, 30) + 0.25 * (turn * dvec3(1.5, -0.5, -0.5)), 1e-12);
+  VdbGrid plain = one_voxel();
+  EXPECT_EQ(read(write({plain})).rotation, glm::dmat3(1.0));
+}
+
+TEST_F(ReadVolume, VoxelsThatAreNoCubesAreRefused) {
+  VdbGrid grid = one_voxel();
+  grid.index_to_source[2][2] = 2;
+  EXPECT_NE(failure(write({grid}), ErrorCode::Unsupported).find("1 x 1 x 2: only cubes are read"), std::string::npos);
+  grid.index_to_source = glm::dmat4(1.0);
+  grid.index_to_source[1][0] = 0.3;
+  EXPECT_NE(failure(write({grid}), ErrorCode::Unsupported).find("sheared"), std::string::npos);
+  const fs::path frustum = folder_.path() / "frustum.vdb";
+  test::write_frustum_vdb(frustum);
+  EXPECT_NE(failure(frustum, ErrorCode::Unsupported).find("frustum"), std::string::npos);
+}
+
+TEST_F(ReadVolume, TheDensityIsFoundByNameOrBecauseThereIsNoOther) {
+  VdbGrid smoke = one_voxel();
+  smoke.name = "smoke";
+  VdbGrid color = one_voxel();
+  color.name = "colour", color.kind = VdbGrid::Kind::Color;
+  const SourceVolume only = read(write({smoke, color}));
+  EXPECT_TRUE(has_warning(only, "ignored: \"colour\""));
+
+  VdbGrid other = one_voxel({0, 0, 0}, 5);
+  other.name = "dust";
+  const fs::path two = write({smoke, other});
+  const std::string message = failure(two, ErrorCode::Unsupported);
+  for (const char* words : {"several float grids", "--density-grid", "\"smoke\" (float)", "\"dust\" (float)", "cloud.vdb"})
+    EXPECT_NE(message.find(words), std::string::npos) << message;
+  EXPECT_EQ(read(two, {.density_grid = "dust"}).densest, 5.0f);
+  EXPECT_NE(failure(two, ErrorCode::Unsupported, {.density_grid = "fog"}).find("there is no grid \"fog\""),
+            std::string::npos);
+  EXPECT_NE(failure(write({smoke, color}), ErrorCode::Unsupported, {.density_grid = "colour"}).find("vec3s"),
+            std::string::npos);
+}
+
+TEST_F(ReadVolume, EmissionIsRefusedAsADensityAndIgnoredBesideOne) {
+  VdbGrid hot = one_voxel();
+  hot.name = "temperature";
+  EXPECT_NE(failure(write({hot}), ErrorCode::Unsupported).find("no float grid is a fog volume"), std::string::npos);
+  EXPECT_NE(failure(write({hot}), ErrorCode::Unsupported, {.density_grid = "temperature"}).find("emission"),
+            std::string::npos);
+  EXPECT_TRUE(has_warning(read(write({one_voxel(), hot})), "emission is not modelled yet; ignored: \"temperature\""));
+}
+
+TEST_F(ReadVolume, ValuesThatAreNoDensitiesAreErrorsWithTheirPlace) {
+  const auto with = [&](double value) {
+    VdbGrid grid = one_voxel();
+    grid.voxels.push_back({{4, 5, 6}, value});
+    return write({grid});
+  };
+  EXPECT_NE(failure(with(NAN), ErrorCode::BadFile).find("density nan at voxel (4, 5, 6)"), std::string::npos);
+  EXPECT_NE(failure(with(INFINITY), ErrorCode::BadFile).find("density inf at voxel (4, 5, 6)"), std::string::npos);
+  EXPECT_NE(failure(with(-0.5), ErrorCode::BadFile).find("negative density -0.5 at voxel (4, 5, 6)"),
+            std::string::npos);
+  EXPECT_TRUE(has_warning(read(with(-1e-6)), "taken as 0"));
+  EXPECT_NE(failure(write({one_voxel({0, 0, 0}, 0)}), ErrorCode::BadFile).find("nothing to see"), std::string::npos);
+  EXPECT_NE(failure(write({VdbGrid()}), ErrorCode::BadFile).find("nothing to see"), std::string::npos);
+  EXPECT_NE(failure(write({one_voxel()}), ErrorCode::BadFile, {.density_scale = 1e38}).find("--density-scale"),
+            std::string::npos);
+  VdbGrid endless = one_voxel();
+  endless.background = 0.1;
+  EXPECT_NE(failure(write({endless}), ErrorCode::Unsupported).find("must end somewhere"), std::string::npos);
+}
+
+TEST_F(ReadVolume, ExtremeDensitiesAreRead) {
+  EXPECT_EQ(read(write({one_voxel({0, 0, 0}, 1e8)})).densest, 1e8f);
+  EXPECT_EQ(read(write({one_voxel({0, 0, 0}, 1e-20)})).densest, 1e-20f);
+}
+
+TEST_F(ReadVolume, LevelSetsBecomeFogOnlyWhenAsked) {
+  VdbGrid grid;
+  grid.kind = VdbGrid::Kind::LevelSet;
+  grid.name = "surface";
+  grid.background = 3;
+  grid.voxels = test::filled_cube({-8, -8, -8}, 17, [](const ivec3& v) {
+    const double d = glm::length(dvec3(v) - 8.0) - 5;
+    return std::abs(d) < 3 ? d : 0;
+  });
+  const fs::path path = write({grid});
+  EXPECT_NE(failure(path, ErrorCode::Unsupported, {.density_grid = "surface"}).find("--level-set"), std::string::npos);
+  const SourceVolume fog = read(path, {.level_set = true});
+  EXPECT_GT(fog.active_voxels, 100u);
+  EXPECT_LE(fog.densest, 1.0f);
+}
+
+TEST_F(ReadVolume, AnExtentThatNoLevelCanHoldIsRefusedBeforeMemoryIsTaken) {
+  VdbGrid grid = one_voxel();
+  grid.voxels.push_back({{1000000, 1000000, 1000000}, 1});
+  EXPECT_NE(failure(write({grid}), ErrorCode::Unsupported).find("crop it or split it"), std::string::npos);
+  grid.voxels.back().at = {2000000000, 0, 0};
+  grid.voxels.push_back({{-2000000000, 0, 0}, 1});
+  EXPECT_NE(failure(write({grid}), ErrorCode::Unsupported).find("4000000001 x 1 x 1"), std::string::npos);
+}
+
+TEST_F(ReadVolume, AlbedosComeFromTheOptionOrTheFileOrAreGuessedAloud) {
+  VdbGrid density = one_voxel();
+  density.voxels.push_back({{9, 0, 0}, 1});
+  VdbGrid color;
+  color.kind = VdbGrid::Kind::Color, color.name = "Cd";
+  color.voxels = {{{0, 0, 0}, 0, vec3(0.25f, 0.5f, 1.0f)}, {{9, 0, 0}, 0, vec3(1.5f, 0, 0)}};
+  const fs::path path = write({density, color});
+  const SourceVolume colored = read(path);
+  ASSERT_EQ(colored.albedos.size(), colored.bricks.size());
+  const vec3 first = unpack_albedo(colored.albedos[colored.brick_at({0, 0, 0})][0]);
+  EXPECT_NEAR(first.x, 0.25f, 1e-4f);
+  EXPECT_NEAR(first.z, 1.0f, 1e-4f);
+  EXPECT_TRUE(has_warning(colored, "1 albedos outside [0, 1]"));
+  const SourceVolume chosen = read(path, {.albedo = vec3(0.5f)});
+  EXPECT_TRUE(chosen.albedos.empty());
+  EXPECT_EQ(chosen.albedo, vec3(0.5f));
+
+  const SourceVolume guessed = read(write({density}));
+  EXPECT_EQ(guessed.albedo, vec3(kDefaultAlbedo));
+  EXPECT_TRUE(has_warning(guessed, "says no albedo"));
+  color.index_to_source = scaled(2);
+  EXPECT_NE(failure(write({density, color}), ErrorCode::Unsupported).find("other transforms"), std::string::npos);
+}
+
+TEST_F(ReadVolume, OptionsAreChecked) {
+  const fs::path path = write({one_voxel()});
+  for (const FogOptions& options :
+       {FogOptions{.density_scale = 0}, FogOptions{.density_scale = NAN}, FogOptions{.anisotropy = 0.99},
+        FogOptions{.albedo = vec3(1.1f)}, FogOptions{.albedo = vec3(0.5f, NAN, 0.5f)}, FogOptions{.anisotropy = NAN}})
+    failure(path, ErrorCode::InvalidArgument, options);
+}
+
+TEST_F(ReadVolume, OptionsAreInTheHash) {
+  const fs::path path = write({one_voxel()});
+  const uint64_t plain = hash_volume(path, {}).value();
+  EXPECT_EQ(read(path).source_hash, plain);
+  for (const FogOptions& options : {FogOptions{.density_scale = 2}, FogOptions{.albedo = vec3(1.0f)},
+                                    FogOptions{.anisotropy = 0.5}, FogOptions{.density_grid = "density"}})
+    EXPECT_NE(hash_volume(path, options).value(), plain);
+}
+
+TEST_F(ReadVolume, DamagedFilesAreErrors) {
+  VdbGrid grid;
+  grid.voxels = test::filled_cube({0, 0, 0}, 20, [](const ivec3& v) { return 1.0 + v.x; });
+  const fs::path path = write({grid}), broken = folder_.path() / "broken.vdb";
+  const std::vector<std::byte> bytes = test::read_bytes(path);
+  for (size_t cut = 8; cut < bytes.size(); cut += bytes.size() / 37) {
+    test::write_bytes(broken, std::span(bytes).first(cut));
+    const auto volume = read_volume(broken);
+    ASSERT_FALSE(volume) << cut;
+    EXPECT_EQ(volume.error().code, ErrorCode::BadFile) << cut << ' ' << volume.error().message;
+  }
+  failure(folder_.path() / "none.vdb", ErrorCode::NotFound);
+  failure(folder_.path(), ErrorCode::Io);
+  failure(folder_.write("text.vdb", "this is no volume at all"), ErrorCode::BadFile);
+  failure(folder_.write("empty.vdb", ""), ErrorCode::BadFile);
+}
+
+TEST_F(ReadVolume, FilesAreKnownByTheirFirstBytes) {
+  const fs::path path = write({one_voxel()});
+  const fs::path other = folder_.path() / "cloud";
+  fs::rename(path, other);
+  EXPECT_TRUE(is_volume_file(other));
+  EXPECT_TRUE(is_volume_file(folder_.path() / "gone.VDB"));
+  EXPECT_FALSE(is_volume_file(folder_.write("model.obj", "v 0 0 0\nv 1 0 0\n")));
+}
+
+}  // namespace
+}  // namespace farfield
