@@ -85,6 +85,9 @@ Result<void> write_versioned(Struct& target, Struct value) {
 }
 
 glm::vec3 to_vec3(const float v[3]) { return {v[0], v[1], v[2]}; }
+ScatterSample to_sample(const FfScatterSample& sample) {
+  return {to_vec3(sample.wi), to_vec3(sample.weight), sample.pdf};
+}
 void copy(const glm::vec3& v, float to[3]) { to[0] = v.x, to[1] = v.y, to[2] = v.z; }
 
 glm::mat4x3 to_matrix(const float m[12]) {
@@ -214,6 +217,14 @@ FfStatus ff_remove_instance(FfRuntime* runtime, uint32_t instance) {
   return guarded([&] { return runtime->runtime->remove_instance(InstanceId{instance}); });
 }
 
+FfStatus ff_limit_instance_levels(FfRuntime* runtime, uint32_t instance, uint8_t finest, uint8_t coarsest) {
+  return guarded([&] { return runtime->runtime->set_level_limits(InstanceId{instance}, {finest, coarsest}); });
+}
+
+FfStatus ff_limit_asset_levels(FfRuntime* runtime, uint32_t asset, uint8_t finest, uint8_t coarsest) {
+  return guarded([&] { return runtime->runtime->set_level_limits(AssetId{asset}, {finest, coarsest}); });
+}
+
 FfStatus ff_set_cameras(FfRuntime* runtime, const FfCamera* cameras, size_t count) {
   return guarded([&]() -> Result<void> {
     std::vector<TessellationCamera> all;
@@ -266,6 +277,14 @@ void ff_measure_transmittance(FfRayContext* context) { context_in(*context).tran
 
 float ff_transmittance(const FfRayContext* context) { return context_in(*context).transmittance; }
 
+void ff_set_differential(FfRayContext* context, const float differential[12], const float unit_direction[3],
+                         int by_longer_axis) {
+  const RayDifferential of_ray{to_vec3(differential), to_vec3(differential + 3), to_vec3(differential + 6),
+                               to_vec3(differential + 9)};
+  context_in(*context).set_differential(of_ray, to_vec3(unit_direction),
+                                        by_longer_axis ? FootprintAxis::Longer : FootprintAxis::Shorter);
+}
+
 void ff_clear_origin(FfRayContext* context) { context_in(*context).set_origin(HitRecord()); }
 
 FfStatus ff_interaction(const FfRuntime* runtime, const RTCRayHit* ray_hit, const FfRayContext* context,
@@ -303,9 +322,12 @@ void ff_ray_origin(const FfInteraction* interaction, const float wi[3], float or
   copy(interaction_in(*interaction).ray_origin(to_vec3(wi)), origin);
 }
 
+void ff_spawn(const FfInteraction* interaction, const FfScatterSample* sample, float t, FfRayContext* context) {
+  interaction_in(*interaction).spawn(to_sample(*sample), t, context_in(*context));
+}
+
 float ff_next_cone_spread(const FfInteraction* interaction, const FfScatterSample* sample, float cone_spread) {
-  const ScatterSample drawn{to_vec3(sample->wi), to_vec3(sample->weight), sample->pdf};
-  return interaction_in(*interaction).next_cone_spread(drawn, cone_spread);
+  return interaction_in(*interaction).next_cone_spread(to_sample(*sample), cone_spread);
 }
 
 }  // extern "C"

@@ -92,6 +92,9 @@ FF_API FfStatus ff_add_instance(FfRuntime* runtime, uint32_t asset, const float 
 FF_API FfStatus ff_move_instance(FfRuntime* runtime, uint32_t instance, const float local_to_world[12]);
 FF_API FfStatus ff_set_visible(FfRuntime* runtime, uint32_t instance, int is_visible);
 FF_API FfStatus ff_remove_instance(FfRuntime* runtime, uint32_t instance);
+/* Both levels included; 0 and 255: no limits. */
+FF_API FfStatus ff_limit_instance_levels(FfRuntime* runtime, uint32_t instance, uint8_t finest, uint8_t coarsest);
+FF_API FfStatus ff_limit_asset_levels(FfRuntime* runtime, uint32_t asset, uint8_t finest, uint8_t coarsest);
 
 typedef struct FfCamera {
   float position[3];
@@ -133,7 +136,7 @@ typedef struct FfRayContext {
   float cone_spread;                 /* world units per unit of t */
   uint32_t path_seed;                /* constant along a path */
   uint32_t ray_seed;                 /* different for every ray */
-  uint64_t state[16];                /* the library's: where the ray starts, and what it hit */
+  uint64_t state[40];                /* the library's: where the ray starts, its differential, and what it hit */
 } FfRayContext;
 FF_API void ff_ray_context_init(FfRayContext* context);
 /* The ray starts at the hit of `from`, which may be the same context. */
@@ -142,6 +145,10 @@ FF_API void ff_set_origin(FfRayContext* context, const FfRayContext* from);
    through; RayContext::transmittance. */
 FF_API void ff_measure_transmittance(FfRayContext* context);
 FF_API float ff_transmittance(const FfRayContext* context);
+/* A differential in place of the cone: d origin / dx, d origin / dy, d direction / dx, d direction / dy, world units
+   per pixel, of a ray with this unit direction. The longer axis of the footprint asks for levels, or the shorter. */
+FF_API void ff_set_differential(FfRayContext* context, const float differential[12], const float unit_direction[3],
+                                int by_longer_axis);
 /* The ray starts elsewhere. */
 FF_API void ff_clear_origin(FfRayContext* context);
 
@@ -179,6 +186,9 @@ FF_API void ff_sample(const FfInteraction* interaction, FfRng* rng, FfScatterSam
 FF_API void ff_eval(const FfInteraction* interaction, const float wi[3], FfRng* rng, float value[3]);
 FF_API float ff_pdf(const FfInteraction* interaction, const float wi[3]);
 FF_API void ff_ray_origin(const FfInteraction* interaction, const float wi[3], float origin[3]);
+/* The context of the ray that goes on in the sampled direction, t along the ray that came: its origin, its level, its
+   cone or differential; ray_seed is still to be given. */
+FF_API void ff_spawn(const FfInteraction* interaction, const FfScatterSample* sample, float t, FfRayContext* context);
 FF_API float ff_next_cone_spread(const FfInteraction* interaction, const FfScatterSample* sample, float cone_spread);
 
 #ifdef __cplusplus

@@ -51,11 +51,6 @@ struct RayContext {
   // In: the cone of the ray [Amanatides 1984]. Its diameter at ray parameter t is cone_width + cone_spread * t.
   float cone_width = 0;   ///< world units at the ray's origin, >= 0
   float cone_spread = 0;  ///< world units per unit of t, >= 0
-  // In, in place of the cone: see set_differential().
-  bool has_differential = false;
-  FootprintAxis footprint_axis = FootprintAxis::Longer;
-  RayDifferential differential;
-  FootprintGrowth footprint_growth;
   // In: randomness. Same values give the same answer.
   uint32_t path_seed = 0;  ///< constant along a path: decides which of two blended levels the path sees
   uint32_t ray_seed = 0;   ///< different for every ray: free flights in volumes
@@ -63,6 +58,11 @@ struct RayContext {
   uint32_t origin_instance = kNoInstance;
   uint8_t origin_level_slot = 0;
   float origin_blend = 0;
+  // In, in place of the cone: see set_differential().
+  bool has_differential = false;
+  FootprintAxis footprint_axis = FootprintAxis::Longer;
+  RayDifferential differential;
+  FootprintGrowth footprint_growth;
 
   // In and out of occlusion queries, unless a filter of the host's is asked. Negative: volumes stop the ray with the
   // probability that they stop light. Else the ray passes volumes, and this is multiplied by the share of light that

@@ -74,9 +74,7 @@ static int trace_path(const Host* host, const float eye[3], const float toward[3
     ff_sample(&hit, &rng, &sample);
     CHECK(sample.pdf <= 0.0f || ff_pdf(&hit, sample.wi) > 0.0f);
     *green *= sample.weight[1];
-    context.cone_width += context.cone_spread * ray.ray.tfar;
-    context.cone_spread = ff_next_cone_spread(&hit, &sample, context.cone_spread);
-    ff_set_origin(&context, &context);
+    ff_spawn(&hit, &sample, ray.ray.tfar, &context);
     ff_ray_origin(&hit, sample.wi, origin);
     memcpy(direction, sample.wi, sizeof direction);
     if (!(*green > 0.0f)) break;
