@@ -47,31 +47,28 @@ Result<std::unique_ptr<BvhDevice>> BvhDevice::create() {
 }
 
 Result<MeasuredScene> build_measured_scene(BvhDevice& device, const std::function<std::vector<EmbreeGeometry>()>& make,
-                                           std::string_view task, uint64_t most_bytes) {
+                                           uint64_t most_bytes, std::string_view what) {
   const std::lock_guard lock(device.build_mutex());
   const uint64_t bytes_before = device.bytes();
   device.reset_peak();
   forget_embree_error(device.handle());  // not ours
 
-  MeasuredScene result;
+  // Up to here Embree may go; what it does not report is small.
   device.set_limit(bytes_before + std::min(most_bytes, kAnyBytes - bytes_before));
+  MeasuredScene result;
   const std::vector<EmbreeGeometry> geometries = make();
-  const auto made = static_cast<uint64_t>(
-      std::ranges::count_if(geometries, [](const EmbreeGeometry& geometry) { return geometry != nullptr; }));
-  const uint64_t overhead_bytes = kSceneOverheadBytes + made * kGeometryOverheadBytes;
-  const uint64_t most_of_embree = most_bytes - std::min(most_bytes, overhead_bytes);
-  device.set_limit(bytes_before + std::min(most_of_embree, kAnyBytes - bytes_before));
   result.scene = build_static_scene(device.handle(), geometries);
-  if (device.end_limit()) {
-    forget_embree_error(device.handle());
-    return make_error(ErrorCode::OutOfBudget,
-                      fmt::format("cannot {}: it takes more than {}", task, format_bytes(most_bytes)));
-  }
-  FARFIELD_TRY(check_embree(device.handle(), task));
-
+  const auto count = static_cast<uint64_t>(
+      std::ranges::count_if(geometries, [](const EmbreeGeometry& geometry) { return geometry != nullptr; }));
+  const uint64_t overheads = kSceneOverheadBytes + count * kGeometryOverheadBytes;
   const uint64_t bytes_after = device.bytes();
-  result.bytes = bytes_after - std::min(bytes_before, bytes_after) + overhead_bytes;
-  result.build_peak_bytes = device.peak_bytes() - bytes_after;
+  result.bytes = bytes_after - std::min(bytes_before, bytes_after) + overheads;
+  result.build_peak_bytes = device.peak_bytes() - std::min(device.peak_bytes(), bytes_after);
+  if (device.end_limit() || result.bytes > most_bytes) {
+    forget_embree_error(device.handle());
+    return make_error(ErrorCode::OutOfBudget, fmt::format("{} takes more than {}", what, format_bytes(most_bytes)));
+  }
+  FARFIELD_TRY(check_embree(device.handle(), fmt::format("build {}", what)));
   return result;
 }
 

@@ -55,9 +55,6 @@ class BvhDevice {
   EmbreeDevice device_;  // last, so released first: what it gives back is still counted
 };
 
-/// As much memory as there is.
-inline constexpr uint64_t kAnyBytes = std::numeric_limits<uint64_t>::max();
-
 /// What Embree does not report: scene objects, geometry objects and malloc's rounding, measured on 3.13.5.
 inline constexpr uint64_t kSceneOverheadBytes = 3072;
 inline constexpr uint64_t kGeometryOverheadBytes = 300;
@@ -69,11 +66,14 @@ struct MeasuredScene {
   uint64_t build_peak_bytes = 0;  ///< further ones at the worst moment of the build
 };
 
+/// As much memory as there is.
+inline constexpr uint64_t kAnyBytes = std::numeric_limits<uint64_t>::max();
+
 /// Builds a scene of what `make` makes (see build_static_scene) on the calling thread alone, so that the same
-/// geometries always take the same bytes; Embree gets no more than `most_bytes` for it, at the worst moment. Holds
-/// device.build_mutex(). task: for the message. Errors: OutOfBudget (most_bytes are not enough), Io (out of memory, or
-/// what else Embree says).
+/// geometries always take the same bytes. Embree gets no more than `most_bytes`, at the worst moment. Holds
+/// device.build_mutex(). what: for messages, "the BVH of 8 quads". Errors: OutOfBudget (most_bytes are not enough), Io
+/// (out of memory, or what else Embree says).
 Result<MeasuredScene> build_measured_scene(BvhDevice& device, const std::function<std::vector<EmbreeGeometry>()>& make,
-                                           std::string_view task, uint64_t most_bytes = kAnyBytes);
+                                           uint64_t most_bytes, std::string_view what);
 
 }  // namespace farfield

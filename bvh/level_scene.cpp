@@ -25,9 +25,8 @@ Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, 
     if (filter) set_filter(quads, filter, user);
     return geometries;
   };
-  FARFIELD_TRY_LET(
-      result.built_,
-      build_measured_scene(device, make, fmt::format("build a BVH of {} quads", level.quads.size()), most_bytes));
+  FARFIELD_TRY_LET(result.built_, build_measured_scene(device, make, most_bytes,
+                                                       fmt::format("the BVH of {} quads", level.quads.size())));
   return result;
 }
 

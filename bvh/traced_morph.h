@@ -29,7 +29,7 @@ struct MorphHit {
 class TracedMorph {
  public:
   /// Builds the BVH from whole levels, of whose arrays it copies what it needs. `fine` and `coarse` are the same levels
-  /// as rays see them, and outlive this. Errors: those of build_measured_scene(), which most_bytes is for.
+  /// as rays see them, and outlive this. most_bytes, errors: those of build_measured_scene().
   static Result<std::unique_ptr<TracedMorph>> build(BvhDevice& device, const LevelView& fine_level,
                                                     const LevelView& coarse_level, const TracedLevel& fine,
                                                     const TracedLevel& coarse, uint64_t most_bytes = kAnyBytes);

@@ -96,18 +96,24 @@ Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::
 }
 
 Result<LoadedItem> load_morph(const OpenAsset& asset, uint32_t slot, BvhDevice& device, uint64_t bytes_left) {
+  const uint64_t file_bytes = asset.levels[slot].file_bytes + asset.levels[slot + 1].file_bytes;
+  if (file_bytes > bytes_left) {
+    return make_error(ErrorCode::OutOfBudget,
+                      fmt::format("its morph to the next level takes more than {}, its manifest says {}; see `farfield "
+                                  "verify`",
+                                  format_bytes(bytes_left), format_bytes(asset.morph_costs[slot]->build_peak_bytes)));
+  }
   const auto open = [&](uint32_t level) {
     return LevelFile::open_known(asset.folder / asset.file_names[level], asset.levels[level].file_bytes,
                                  asset.file_hashes[level]);
   };
   FARFIELD_TRY_LET(const auto fine, open(slot));
   FARFIELD_TRY_LET(const auto coarse, open(slot + 1));
-  const uint64_t files = level_file_sizes(fine->view()).memory_bytes + level_file_sizes(coarse->view()).memory_bytes;
   auto loaded = std::make_unique<LoadedMorph>();
   FARFIELD_TRY_LET(loaded->traced, TracedMorph::build(device, fine->view(), coarse->view(),
                                                       *asset.traced.loaded[slot].load(std::memory_order_acquire),
                                                       *asset.traced.loaded[slot + 1].load(std::memory_order_acquire),
-                                                      bytes_left - std::min(bytes_left, files)));
+                                                      bytes_left - file_bytes));
   const LevelCost cost = loaded->traced->cost(fine->view(), coarse->view());
   return LoadedItem{std::move(loaded), cost.resident_bytes, cost.build_peak_bytes};
 }

@@ -88,7 +88,6 @@ Manifest sample_manifest() {
     level.bricks = k;
     level.resident_bytes = 4096 * (4 - k);
     level.build_peak_bytes = 100 * (4 - k);
-    if (k > 0) level.morph = LevelCost{70000 - k, 300 + k};
     if (k == 1) level.errors = LevelErrors{-0.01, 0.02, 0.03};
     manifest.levels.push_back(level);
   }
