@@ -109,7 +109,6 @@ Result<LoadedItem> load_morph(const OpenAsset& asset, uint32_t slot, BvhDevice& 
   };
   FARFIELD_TRY_LET(const auto fine, open(slot));
   FARFIELD_TRY_LET(const auto coarse, open(slot + 1));
-  const uint64_t files = level_file_sizes(fine->view()).memory_bytes + level_file_sizes(coarse->view()).memory_bytes;
   auto loaded = std::make_unique<LoadedMorph>();
   FARFIELD_TRY_LET(loaded->traced, TracedMorph::build(device, fine->view(), coarse->view(),
                                                       *asset.traced.loaded[slot].load(std::memory_order_acquire),
