@@ -16,8 +16,8 @@
 #include <utility>
 
 #include "bake/asset_textures.h"
-#include "bake/bake_workspace.h"
 #include "bake/bake_volume.h"
+#include "bake/bake_workspace.h"
 #include "bake/level_writer.h"
 #include "bake/pack_level.h"
 #include "bake/pack_source.h"
@@ -489,7 +489,7 @@ class Baker {
   Surface wall_;                   ///< pieces of the walls that are wrapped at the level at hand
   std::vector<uint8_t> is_shell_;  ///< faces of surface_ that are such walls
   MorphMaps from_stored_;          ///< from the last written level to surface_
-  dvec3 middle_{0.0};  ///< of the source's bounds
+  dvec3 middle_{0.0};              ///< of the source's bounds
   uint32_t last_level_ = 0;
 };
 
@@ -561,8 +561,7 @@ std::optional<Manifest> find_up_to_date(const fs::path& source, const fs::path& 
   if (!manifest || !manifest->source_files) return std::nullopt;
   const auto source_hash = hash_source(source, *manifest->source_files, options.import);
   if (!source_hash) return std::nullopt;
-  const Manifest wanted =
-      make_manifest(source.filename().string(), *source_hash, options, is_volume_file(source));
+  const Manifest wanted = make_manifest(source.filename().string(), *source_hash, options, is_volume_file(source));
   if (!are_same_bake(*manifest, wanted) || !is_whole(out, *manifest)) return std::nullopt;
   return std::move(*manifest);
 }

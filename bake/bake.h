@@ -20,11 +20,11 @@
 namespace farfield {
 
 struct BakeOptions {
-  uint32_t finest_grid = 512;       ///< level 1: longest side of the bounds / r_1. A power of two >= coarsest_grid
-  uint32_t coarsest_grid = 8;       ///< last level, the root
-  uint32_t rays_per_voxel = 200;    ///< thesis 10.1.3
+  uint32_t finest_grid = 512;     ///< level 1: longest side of the bounds / r_1. A power of two >= coarsest_grid
+  uint32_t coarsest_grid = 8;     ///< last level, the root
+  uint32_t rays_per_voxel = 200;  ///< thesis 10.1.3
   Downsampling downsampling = Downsampling::Matched;  ///< of volumes, whose grids and rays the file decides
-  bool source_only = false;         ///< write only level 0 (what --full-detail renders)
+  bool source_only = false;                           ///< write only level 0 (what --full-detail renders)
   bool even_if_up_to_date = false;  ///< of an asset in memory: its hash does not say all that it depends on
   ImportOptions import;
 
@@ -63,8 +63,8 @@ std::optional<Manifest> find_up_to_date(const std::filesystem::path& source, con
 
 /// Bakes `source` into the folder `out` (created; conventionally NAME.farfield). Same source and options give the same
 /// bytes for any thread count. Interrupted bakes resume: finished levels are found by hash and kept; the manifest is
-/// written last. Errors, with the warnings that came before: those of import_asset or read_volume; InvalidArgument (options); Io (with
-/// nothing half-written under a final name); Cancelled.
+/// written last. Errors, with the warnings that came before: those of import_asset or read_volume; InvalidArgument
+/// (options); Io (with nothing half-written under a final name); Cancelled.
 Result<BakeReport> bake(const std::filesystem::path& source, const std::filesystem::path& out,
                         const BakeOptions& options);
 

@@ -9,8 +9,8 @@
 
 #include "bake/level_writer.h"
 #include "bake/pack_fog.h"
-#include "scattering/fog_phase.h"
 #include "bake/stopwatch.h"
+#include "scattering/fog_phase.h"
 
 namespace farfield {
 namespace {
@@ -46,8 +46,8 @@ Result<BakeReport> bake_levels(const SourceVolume& volume, const BakeOptions& op
     const Job job = options.job.step(fmt::format("level {}: {}", level, level == 0 ? "pack" : "downsample"),
                                      done_before(level, last), done_before(level + 1, last));
     const Stopwatch making;
-    FARFIELD_TRY_LET(const LevelData packed, level == 0 ? pack_source_fog(volume, job)
-                                                        : pack_fog(volume, level, options.downsampling, job));
+    FARFIELD_TRY_LET(const LevelData packed,
+                     level == 0 ? pack_source_fog(volume, job) : pack_fog(volume, level, options.downsampling, job));
     done.voxels = voxel_count(packed);
     done.voxelize_seconds = making.seconds();
     const Stopwatch writing;

@@ -121,8 +121,8 @@ Result<LevelData> pack_bricks(const SourceVolume& source, const ivec3& dims, dou
   for_each_brick(level, [&](const Brick& brick, const ivec3& coordinates) {
     const Box3 voxels = active_box(brick);
     const dvec3 corner = dvec3(coordinates * kBrickSide);
-    level.header.bounds.extend(Box3{vec3((corner + dvec3(voxels.lower)) * voxel_size),
-                                    vec3((corner + dvec3(voxels.upper)) * voxel_size)});
+    level.header.bounds.extend(
+        Box3{vec3((corner + dvec3(voxels.lower)) * voxel_size), vec3((corner + dvec3(voxels.upper)) * voxel_size)});
   });
   return level;
 }
@@ -170,7 +170,8 @@ Result<LevelData> pack_fog(const SourceVolume& source, uint32_t level, Downsampl
     });
     return std::ranges::any_of(voxels, [](const FogVoxel& voxel) { return voxel.density > 0; });
   };
-  FARFIELD_TRY_LET(auto packed, pack_bricks(source, downsampler.dims(), source.voxel_size * (1 << level), channels, job.step("", 0.5, 1), voxels_of));
+  FARFIELD_TRY_LET(auto packed, pack_bricks(source, downsampler.dims(), source.voxel_size * (1 << level), channels,
+                                            job.step("", 0.5, 1), voxels_of));
   packed.header.level = level;
   return packed;
 }

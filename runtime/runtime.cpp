@@ -128,7 +128,8 @@ Result<InstanceId> Runtime::add_instance(AssetId asset, const glm::mat4x3& local
   std::vector<InstanceRecord>& instances = impl_->geometry.instances;
   if (instances.size() >= kNoInstance) return make_error(ErrorCode::InvalidArgument, "too many instances");
   const OpenAsset& opened = impl_->levels.asset(asset.value);
-  FARFIELD_TRY_LET(auto record, make_instance(asset.value, with_origin(local_to_world, opened.origin, opened.rotation)));
+  FARFIELD_TRY_LET(auto record,
+                   make_instance(asset.value, with_origin(local_to_world, opened.origin, opened.rotation)));
   record.footprint.world_to_r0 = impl_->options.pixel_error / largest_stretch(local_to_world);
   instances.push_back(record);
   if (data != InstanceData()) {

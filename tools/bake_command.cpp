@@ -137,15 +137,18 @@ Result<void> run_bake(BakeArguments& arguments) {
 void add_bake_command(CLI::App& app, Action& action) {
   auto arguments = std::make_shared<BakeArguments>();
   BakeOptions& options = arguments->options;
-  CLI::App* command =
-      app.add_subcommand("bake", "Bake a model or a volume to a folder of levels; goes on where an interrupted bake stopped");
-  command->add_option("source", arguments->source, "Model: OBJ, PLY, glTF or glb, gzipped or not. Volume: OpenVDB (.vdb)")
+  CLI::App* command = app.add_subcommand(
+      "bake", "Bake a model or a volume to a folder of levels; goes on where an interrupted bake stopped");
+  command
+      ->add_option("source", arguments->source, "Model: OBJ, PLY, glTF or glb, gzipped or not. Volume: OpenVDB (.vdb)")
       ->required()
       ->check(is_named);
   command->add_option("-o,--output", arguments->output, "Folder to write, by convention NAME.farfield")
       ->required()
       ->check(is_named);
-  command->add_option("--finest-grid", options.finest_grid, "Voxels along the longest side of level 1, a power of two; of models, a volume's grid is its own")
+  command
+      ->add_option("--finest-grid", options.finest_grid,
+                   "Voxels along the longest side of level 1, a power of two; of models, a volume's grid is its own")
       ->capture_default_str();
   command->add_option("--coarsest-grid", options.coarsest_grid, "The same of the last level, the root")
       ->capture_default_str();

@@ -197,9 +197,9 @@ struct BakeSummary {
 FARFIELD_API Result<BakeSummary> bake_meshes(const BakeInput& input, const std::string& folder,
                                              const BakeSettings& settings = {});
 
-/// The same for a file: OBJ with MTL, PLY, glTF or glb, gzipped or not; or an OpenVDB volume (.vdb), whose grids are its
-/// own and whose densities are taken as they are, in 1 / scene unit. mesh: of glTF this one alone, in its own space;
-/// -1: all nodes of the scene. Errors: also those of reading it.
+/// The same for a file: OBJ with MTL, PLY, glTF or glb, gzipped or not; or an OpenVDB volume (.vdb), whose grids are
+/// its own and whose densities are taken as they are, in 1 / scene unit. mesh: of glTF this one alone, in its own
+/// space; -1: all nodes of the scene. Errors: also those of reading it.
 FARFIELD_API Result<BakeSummary> bake_file(const std::string& source, const std::string& folder,
                                            const BakeSettings& settings = {}, int mesh = -1);
 

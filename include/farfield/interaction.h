@@ -39,8 +39,8 @@ class FARFIELD_API Interaction {
   uint32_t level = 0;                ///< k of the level that was hit
   float lambda = 0;                  ///< continuous level that the ray asked for
   glm::vec3 albedo{0.0f};            ///< of highlight and base together, for AOVs and denoisers
-  float anisotropy = 0;      ///< mean cosine of what fog scatters once; 0 for surfaces and flakes
-  float self_shadowing = 1;  ///< in volumes: share of light that leaves after one collision, in (0, 1]
+  float anisotropy = 0;              ///< mean cosine of what fog scatters once; 0 for surfaces and flakes
+  float self_shadowing = 1;          ///< in volumes: share of light that leaves after one collision, in (0, 1]
   glm::vec3 emission{0.0f};          ///< radiance that leaves the point along wo by itself
 
   // For a host that shades level 0 with its own materials; at coarser levels unknown: prefiltered faces have none.
