@@ -68,8 +68,9 @@ std::string canonical_options(const BakeOptions& options, bool is_volume) {
   const std::string node = options.import.node < 0 ? "" : fmt::format("node={} ", options.import.node);
   const std::string import = fmt::format("mesh={} {}condition={}", options.import.mesh, node, kConditionVersion);
   if (options.source_only) return "source_only=1 " + import;
-  return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} {} voxelize={}", options.finest_grid,
-                     options.coarsest_grid, options.rays_per_voxel, import, kVoxelizeVersion);
+  constexpr int kMorphVersion = 1;  // of what the manifest has of morphs
+  return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} {} voxelize={} morph={}", options.finest_grid,
+                     options.coarsest_grid, options.rays_per_voxel, import, kVoxelizeVersion, kMorphVersion);
 }
 
 /// What a bake of `source` with these options writes into its manifest, but for the levels.
@@ -89,7 +90,7 @@ bool are_same_bake(const Manifest& a, const Manifest& b) {
 /// Whether every level's and texture's file is the one that the manifest means.
 bool is_whole(const fs::path& asset, const Manifest& manifest) {
   const bool has_levels = std::ranges::all_of(manifest.levels, [&](const LevelEntry& entry) {
-    const auto file = LevelFile::open_known(asset / entry.file, entry.file_hash);
+    const auto file = LevelFile::open_known(asset / entry.file, entry.file_bytes, entry.file_hash);
     return file && (*file)->file_bytes() == entry.file_bytes;
   });
   return has_levels && std::ranges::all_of(manifest.textures, [&](const AssetTexture& texture) {

@@ -9,6 +9,7 @@
 
 #include "bvh/level_scene.h"
 #include "bvh/ray_cost.h"
+#include "bvh/traced_morph.h"
 #include "cache/level_file.h"
 
 namespace farfield {
@@ -50,9 +51,18 @@ Result<bool> LevelWriter::write(const LevelData& level, uint32_t grid, uint64_t 
   const std::filesystem::path path = folder_ / entry.file;
   FARFIELD_TRY_LET(entry.file_bytes, write_level(path, level));
   FARFIELD_TRY_LET(entry.file_hash, hash_level_file(path));
+  if (!manifest_.levels.empty()) {
+    FARFIELD_TRY_LET(entry.morph, measure_morph_to(view));
+  }
   manifest_.levels.push_back(entry);
   add_to_hull(view, hull_);
   return true;
+}
+
+Result<LevelCost> LevelWriter::measure_morph_to(const LevelView& level) const {
+  const std::filesystem::path finer = folder_ / manifest_.levels.back().file;
+  FARFIELD_TRY_LET(const auto file, LevelFile::open(finer, LevelCheck::Structure));
+  return measure_morph(file->view(), level);
 }
 
 Result<void> LevelWriter::finish() {

@@ -28,6 +28,9 @@ class LevelWriter {
   Result<void> finish();
 
  private:
+  /// What the morph from the last written level to this one takes.
+  Result<LevelCost> measure_morph_to(const LevelView& level) const;
+
   std::filesystem::path folder_;
   MeasureLevel measure_;
   Manifest& manifest_;

@@ -31,7 +31,9 @@ Result<uint64_t> parse_bytes(std::string_view text) {
   if (status != std::errc() || !(value >= 0.0)) return bad();
 
   std::string unit;
-  for (const char* c = rest; c != text.data() + text.size(); ++c) {
+  const char* const end = text.data() + text.size();
+  const bool has_blank = end - rest > 1 && *rest == ' ';  // as format_bytes() writes it
+  for (const char* c = rest + has_blank; c != end; ++c) {
     unit += static_cast<char>(std::tolower(static_cast<unsigned char>(*c)));
   }
   if (unit.ends_with("ib")) {

@@ -58,8 +58,9 @@ inline EmbreeScene retain(EmbreeSceneRef scene) {
 
 // --- Devices ---------------------------------------------------------------------------------------------------------
 
-/// threads: what Embree limits TBB to while the device lives; 0: no limit, and none by other devices either.
-/// Errors: Unsupported (Embree does not start).
+/// threads: what Embree limits TBB to while the device lives; 0: no limit, and none by other devices either. Triangles
+/// that move keep their corners in the BVH where the processor has AVX: rays are 1.3 to 1.9 times as fast as in
+/// Embree's default, which gathers them. Errors: Unsupported (Embree does not start).
 Result<EmbreeDevice> make_embree_device(int threads = 0);
 
 /// What went wrong on the device since the last call: "Embree cannot TASK: REASON", an Io. Forgets it.
@@ -100,13 +101,17 @@ void share_array(EmbreeGeometryRef geometry, std::span<const T> array) {
   rtcSetSharedGeometryBuffer(geometry, EmbreeArray<T>::kType, 0, EmbreeArray<T>::kFormat, array.data(), 0, sizeof(T),
                              array.size());
 }
-/// The geometry gets a copy, with room behind it.
+/// The geometry gets a copy, with room behind it; positions of one of the times of a geometry that moves.
 template <typename T>
-void copy_array(EmbreeGeometryRef geometry, std::span<const T> array) {
-  void* copy =
-      rtcSetNewGeometryBuffer(geometry, EmbreeArray<T>::kType, 0, EmbreeArray<T>::kFormat, sizeof(T), array.size());
+void copy_array(EmbreeGeometryRef geometry, std::span<const T> array, unsigned time_step = 0) {
+  void* copy = rtcSetNewGeometryBuffer(geometry, EmbreeArray<T>::kType, time_step, EmbreeArray<T>::kFormat, sizeof(T),
+                                       array.size());
   if (copy) std::copy(array.begin(), array.end(), static_cast<T*>(copy));  // null: out of memory, which the device says
 }
+
+/// The geometry moves along straight lines between as many positions, the first at time 0, the last at time 1. Before
+/// its arrays.
+inline void set_time_steps(EmbreeGeometryRef geometry, unsigned count) { rtcSetGeometryTimeStepCount(geometry, count); }
 
 /// Asked about every hit, of nearest-hit and occlusion queries alike.
 inline void set_filter(EmbreeGeometryRef geometry, EmbreeFilter filter, void* user) {
@@ -137,10 +142,14 @@ inline unsigned attach_geometry(EmbreeSceneRef scene, EmbreeGeometryRef geometry
 }
 inline void detach_geometry(EmbreeSceneRef scene, unsigned id) { rtcDetachGeometry(scene, id); }
 
-/// A committed scene of medium quality whose only geometry is this one (committed here), with the id 0 and no mask.
-/// Built on the calling thread alone: a parallel build may order primitives differently, and with them the bytes that
-/// it takes and which of two equal hits is reported; and a thread that waits in here must not run a foreign task.
-EmbreeScene build_static_scene(EmbreeDeviceRef device, EmbreeGeometryRef geometry);
+/// A committed scene of medium quality of these geometries (committed here), with their places as ids and no mask; null
+/// ones are left out. Built on the calling thread alone: a parallel build may order primitives differently, and with
+/// them the bytes that it takes and which of two equal hits is reported; and a thread that waits in here must not run a
+/// foreign task.
+EmbreeScene build_static_scene(EmbreeDeviceRef device, std::span<const EmbreeGeometry> geometries);
+inline EmbreeScene build_static_scene(EmbreeDeviceRef device, const EmbreeGeometry& geometry) {
+  return build_static_scene(device, std::span(&geometry, 1));
+}
 
 /// A committed instance of a scene as Embree itself has them: what ours are measured against.
 inline EmbreeGeometry new_native_instance(EmbreeDeviceRef device, EmbreeSceneRef object, const mat4x3& local_to_world) {

@@ -56,6 +56,19 @@ Result<RegularFile> open_regular_file(const fs::path& path) {
   return RegularFile{std::move(fd), static_cast<uint64_t>(status.st_size)};
 }
 
+Result<void> read_fully(int descriptor, std::span<std::byte> bytes, const fs::path& path) {
+  while (!bytes.empty()) {
+    const ssize_t got = ::read(descriptor, bytes.data(), bytes.size());
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) {
+      return make_error(ErrorCode::Io, fmt::format("cannot read {}: {}", path.string(),
+                                                   got < 0 ? system_words(errno) : "it became shorter meanwhile"));
+    }
+    bytes = bytes.subspan(static_cast<size_t>(got));
+  }
+  return {};
+}
+
 Result<std::string> read_small_file(const fs::path& path, uint64_t max_bytes) {
   FARFIELD_TRY_LET(const auto file, open_regular_file(path));
   if (file.bytes > max_bytes) {
@@ -63,15 +76,7 @@ Result<std::string> read_small_file(const fs::path& path, uint64_t max_bytes) {
                                                       format_bytes(file.bytes), format_bytes(max_bytes)));
   }
   std::string text(file.bytes, '\0');
-  for (size_t done = 0; done < text.size();) {
-    const ssize_t got = ::read(file.descriptor.get(), text.data() + done, text.size() - done);
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) {
-      return make_error(ErrorCode::Io, fmt::format("cannot read {}: {}", path.string(),
-                                                   got < 0 ? system_words(errno) : "it became shorter meanwhile"));
-    }
-    done += static_cast<size_t>(got);
-  }
+  FARFIELD_TRY(read_fully(file.descriptor.get(), std::as_writable_bytes(std::span(text)), path));
   return text;
 }
 

@@ -42,6 +42,9 @@ struct RegularFile {
 /// file, a link).
 Result<RegularFile> open_regular_file(const std::filesystem::path& path);
 
+/// Fills `bytes` from where an open file stands. path: for messages. Errors: Io (also if the file ends before).
+Result<void> read_fully(int descriptor, std::span<std::byte> bytes, const std::filesystem::path& path);
+
 /// Reads a whole regular file of at most `max_bytes`. Errors: those of open_regular_file, BadFile (too large).
 Result<std::string> read_small_file(const std::filesystem::path& path, uint64_t max_bytes);
 

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace farfield {
 
@@ -26,6 +28,8 @@ struct HashedFile {
 
 /// 16 lower-case hexadecimal digits, as manifests write hashes.
 std::string to_hex(uint64_t value);
+/// What to_hex() wrote; nothing for other text.
+std::optional<uint64_t> from_hex(std::string_view digits);
 
 /// Bijective mixing of 64 bits (splitmix64 finaliser): neighbouring inputs give unrelated outputs.
 inline constexpr uint64_t mix64(uint64_t x) {

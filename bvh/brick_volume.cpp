@@ -39,12 +39,14 @@ constexpr float kSigmaBound = 1.00393f;
 /// Random numbers of one flight.
 class FlightRandom {
  public:
-  explicit FlightRandom(uint64_t seed) : bits_(seed) {}
+  FlightRandom(uint64_t seed, float share) : bits_(seed), per_depth_(1.0f / share) {}
   float uniform() { return to_unit_float(bits_.next()); }
-  float optical_depth() { return -std::log(1.0f - uniform()); }  // 24 bits: the difference is exact and not 0
+  /// Of the whole medium: where only a share of it is there, a flight goes so much deeper.
+  float optical_depth() { return -std::log(1.0f - uniform()) * per_depth_; }  // 24 bits: exact, and not 0
 
  private:
   SplitMix bits_;
+  float per_depth_;
 };
 
 int clamped_cell(float coordinate, int count) {
@@ -215,7 +217,7 @@ bool BrickVolume::skim_brick(Flight& flight, const Brick& brick, const ivec3& br
   }
 }
 
-std::optional<VolumeHit> BrickVolume::first_collision(const LocalRay& ray, uint64_t seed) const {
+std::optional<VolumeHit> BrickVolume::first_collision(const LocalRay& ray, uint64_t seed, float share) const {
   if (is_empty()) return std::nullopt;
   const LocalRay in_voxels{(ray.origin - origin_) * inverse_voxel_size_, ray.direction * inverse_voxel_size_,
                            ray.t_near, ray.t_far};
@@ -225,7 +227,7 @@ std::optional<VolumeHit> BrickVolume::first_collision(const LocalRay& ray, uint6
 
   const float speed = glm::length(ray.direction);
   if (!(speed > 0.0f && speed < kInfinity)) return std::nullopt;
-  FlightRandom random(seed);
+  FlightRandom random(seed, share);
   const float depth = random.optical_depth();
   const float s_end = range.t_far - range.t_near, bound = attenuation_bound() * speed;
   if (densest_scale_ * bound * s_end < depth) return std::nullopt;

@@ -68,8 +68,9 @@ class BrickVolume {
   /// P(no collision before t) = exp(-integral of rho sqrt(d^T S d) dt), d the unnormalised direction. That integral is
   /// the same in every space that an affine map leads to, so instances keep their transmittance under any transform
   /// (the flakes are carried along). A pure function of the arguments: the same seed gives the same collision, whatever
-  /// t_far beyond it. Zero direction, NaN or infinite origins: none.
-  std::optional<VolumeHit> first_collision(const LocalRay& ray, uint64_t seed) const;
+  /// t_far beyond it. Zero direction, NaN or infinite origins: none. share, in (0, 1]: of the flakes that are there;
+  /// all densities are so much lower.
+  std::optional<VolumeHit> first_collision(const LocalRay& ray, uint64_t seed, float share = 1) const;
 
  private:
   struct Flight;

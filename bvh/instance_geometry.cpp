@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The callbacks, and what Embree 3.13 demands of them:
 //
-// * Single rays (N == 1) are transformed in place and traced with the caller's own context: args->rayhit is the
-//   caller's EmbreeRayHit, and a fresh context would lose the host's RayContext. Within packets (N > 1) rays are
-//   copies.
+// * Single rays (N == 1) are transformed in place and traced with the ray's RayContext: args->rayhit is the caller's
+//   EmbreeRayHit, and the filter of a level's faces casts the context back. Within packets (N > 1) rays are copies.
 // * The direction is not normalised, so t means the same inside and outside and tnear/tfar need no change.
 // * A nested hit writes the nested scene's ids, and may do so without shrinking tfar (equal distances). So geomID is
 //   set aside before the nested call, and what it is afterwards tells whether there was a hit.
@@ -15,11 +14,14 @@
 
 #include <fmt/format.h>
 
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "base/check.h"
 #include "base/hash.h"
+#include "bvh/traced_morph.h"
 
 namespace farfield {
 
@@ -58,15 +60,8 @@ class InLocalSpace {
   vec3 direction_;
 };
 
-/// trace_nearest that leaves the outer hit's ids alone if it finds nothing.
-bool intersect_surface(EmbreeSceneRef scene, EmbreeContext& context, EmbreeRayHit& ray_hit) {
-  const unsigned outer_id = ray_hit.hit.geomID;
-  if (trace_nearest(scene, context, ray_hit)) return true;
-  ray_hit.hit.geomID = outer_id;
-  return false;
-}
-
-uint64_t flight_seed(const RayContext& context, uint32_t instance) { return mix64(context.ray_seed, instance); }
+/// Random bits of a ray in an instance.
+uint64_t bits_of_ray(const RayContext& context, uint32_t instance) { return mix64(context.ray_seed, instance); }
 
 glm::dmat3 linear_part(const mat4x3& m) { return {glm::dvec3(m[0]), glm::dvec3(m[1]), glm::dvec3(m[2])}; }
 
@@ -145,8 +140,9 @@ Box3 instance_bounds(const InstanceRecord& instance, const TracedAsset& asset) {
 /// A ray that enters an instance: with which level it deals there.
 struct InstanceGeometry::Visit {
   LocalRay ray;
-  const TracedLevel* level;
   LevelChoice choice;
+  const TracedLevel* level = nullptr;
+  const TracedMorph* morph = nullptr;  ///< in place of the level
 };
 
 /// Fills in `visit`. False: the ray passes by.
@@ -159,9 +155,59 @@ bool InstanceGeometry::enter(uint32_t instance, const EmbreeRay& ray, const RayC
   if (!(range.t_near * (1.0f - kRangePad) <= range.t_far * (1.0f + kRangePad))) return false;
 
   visit.choice = choose_level(asset, record.footprint, instance, context, range.t_near, forced_lambda);
+  if (visit.choice.blend > 0.0f) {
+    visit.morph = asset.morphs[visit.choice.slot].load(std::memory_order_acquire);
+    if (!visit.morph) visit.morph = source_.serve_morph(record.asset, visit.choice.slot);
+    if (visit.morph) return true;
+    visit.choice.slot = dissolve({visit.choice.slot, visit.choice.slot + 1, visit.choice.blend}, instance, context);
+    visit.choice.blend = 0.0f;
+  }
   visit.level = asset.loaded[visit.choice.slot].load(std::memory_order_acquire);
   if (!visit.level) visit.level = source_.serve(record.asset, visit.choice.slot);
   return visit.level != nullptr;
+}
+
+/// The nearest hit on a level, and what the record has of it. False: none, and ray_hit's ids are not to be trusted.
+bool InstanceGeometry::intersect_level(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
+                                       EmbreeContext& embree_context, HitRecord& made) {
+  const TracedLevel& level = *visit.level;
+  RTCHit& hit = ray_hit.hit;
+  bool on_surface = false;
+  if (level.scene.handle()) {
+    const InLocalSpace scope(ray_hit.ray, visit.ray);
+    on_surface = trace_nearest(level.scene.handle(), embree_context, ray_hit);
+  }
+  made.level_slot = static_cast<uint8_t>(level.slot);
+  if (!level.volume.is_empty()) {
+    LocalRay up_to_surface = visit.ray;
+    up_to_surface.t_far = ray_hit.ray.tfar;
+    if (const auto collision = level.volume.first_collision(up_to_surface, flight_seed(ray_bits, level.slot))) {
+      ray_hit.ray.tfar = collision->t;
+      made.is_volume = true;
+      made.element = collision->payload;
+      return true;
+    }
+  }
+  if (!on_surface) return false;
+  made.element = 2 * hit.primID + quad_side(hit.u, hit.v);
+  const vec2 barycentric = face_barycentric(hit.u, hit.v);
+  made.barycentric[0] = barycentric.x, made.barycentric[1] = barycentric.y;
+  return true;
+}
+
+/// The same on a morph.
+bool InstanceGeometry::intersect_morph(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
+                                       EmbreeContext& embree_context, HitRecord& made) {
+  const InLocalSpace scope(ray_hit.ray, visit.ray);
+  const auto found = visit.morph->intersect(ray_hit, embree_context, visit.choice.blend, ray_bits);
+  if (!found) return false;
+  made.level_slot = static_cast<uint8_t>(visit.choice.slot);
+  made.blend = visit.choice.blend;
+  made.is_volume = found->is_volume;
+  made.is_coarser = found->is_coarser;
+  made.element = found->element;
+  made.barycentric[0] = found->barycentric.x, made.barycentric[1] = found->barycentric.y;
+  return true;
 }
 
 bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, EmbreeRayHit& ray_hit,
@@ -170,37 +216,24 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
   if (!enter(instance, ray_hit.ray, context, visit)) return false;
   EmbreeRay& ray = ray_hit.ray;
   RTCHit& hit = ray_hit.hit;
-
-  bool on_surface = false;
-  if (visit.level->scene.handle()) {
-    const InLocalSpace scope(ray, visit.ray);
-    on_surface = intersect_surface(visit.level->scene.handle(), *embree_context, ray_hit);
-  }
-  std::optional<VolumeHit> collision;
-  if (!visit.level->volume.is_empty()) {
-    LocalRay up_to_surface = visit.ray;
-    up_to_surface.t_far = ray.tfar;
-    collision = visit.level->volume.first_collision(up_to_surface, flight_seed(context, instance));
-  }
-  if (!on_surface && !collision) return false;
-
+  const unsigned outer_id = hit.geomID;
   HitRecord made;
+  const bool is_hit = visit.morph
+                          ? intersect_morph(visit, bits_of_ray(context, instance), ray_hit, *embree_context, made)
+                          : intersect_level(visit, bits_of_ray(context, instance), ray_hit, *embree_context, made);
+  if (!is_hit) {
+    hit.geomID = outer_id;
+    return false;
+  }
   made.instance = instance;
-  made.level_slot = static_cast<uint8_t>(visit.level->slot);
   const InstanceRecord& hit_instance = instances[instance];
   made.lambda = lambda_of_choice(*assets[hit_instance.asset], hit_instance.footprint, visit.choice, forced_lambda);
   vec3 normal_world(0.0f);
-  if (collision) {
-    ray.tfar = collision->t;
-    made.is_volume = true;
-    made.element = collision->payload;
+  if (made.is_volume) {
     hit.u = hit.v = 0.0f;
     hit.instID[0] = embree_context->instID[0];
   } else {
     const vec3 normal(hit.Ng_x, hit.Ng_y, hit.Ng_z);
-    made.element = 2 * hit.primID + quad_side(hit.u, hit.v);
-    const vec2 barycentric = face_barycentric(hit.u, hit.v);
-    made.barycentric[0] = barycentric.x, made.barycentric[1] = barycentric.y;
     made.normal_local[0] = normal.x, made.normal_local[1] = normal.y, made.normal_local[2] = normal.z;
     normal_world = hit_instance.normal_to_world(normal);
   }
@@ -216,12 +249,18 @@ bool InstanceGeometry::occluded(uint32_t instance, EmbreeRay& ray, const RayCont
                                 EmbreeContext* embree_context) const {
   Visit visit;
   if (!enter(instance, ray, context, visit)) return false;
+  if (visit.morph) {
+    const InLocalSpace scope(ray, visit.ray);
+    return visit.morph->occluded(ray, *embree_context, visit.choice.blend, bits_of_ray(context, instance));
+  }
   if (visit.level->scene.handle()) {
     const InLocalSpace scope(ray, visit.ray);
     if (trace_occlusion(visit.level->scene.handle(), *embree_context, ray)) return true;
   }
   const BrickVolume& volume = visit.level->volume;
-  if (volume.is_empty() || !volume.first_collision(visit.ray, flight_seed(context, instance))) return false;
+  if (volume.is_empty() ||
+      !volume.first_collision(visit.ray, flight_seed(bits_of_ray(context, instance), visit.level->slot)))
+    return false;
   ray.tfar = -kInfinity;
   return true;
 }
@@ -231,19 +270,131 @@ bool InstanceGeometry::occluded(uint32_t instance, EmbreeRay& ray, const RayCont
 void InstanceGeometry::bounds_callback(const RTCBoundsFunctionArguments* args) {
   const auto& self = *static_cast<const InstanceGeometry*>(args->geometryUserPtr);
   const InstanceRecord& instance = self.instances[args->primID];
-  const Box3 bounds = instance_bounds(instance, *self.assets[instance.asset]);
+  // The empty box of a hidden instance is not valid: Embree leaves it out.
+  const Box3 bounds = self.is_hidden(args->primID) ? Box3() : instance_bounds(instance, *self.assets[instance.asset]);
   args->bounds_o->lower_x = bounds.lower.x, args->bounds_o->upper_x = bounds.upper.x;
   args->bounds_o->lower_y = bounds.lower.y, args->bounds_o->upper_y = bounds.upper.y;
   args->bounds_o->lower_z = bounds.lower.z, args->bounds_o->upper_z = bounds.upper.z;
 }
 
+namespace {
+
+using AskFilters = void (*)(const void* args, const EmbreeFilterArguments* asked);
+
+void ask_intersection_filters(const void* args, const EmbreeFilterArguments* asked) {
+  rtcFilterIntersection(static_cast<const RTCIntersectFunctionNArguments*>(args), asked);
+}
+void ask_occlusion_filters(const void* args, const EmbreeFilterArguments* asked) {
+  rtcFilterOcclusion(static_cast<const RTCOccludedFunctionNArguments*>(args), asked);
+}
+
+}  // namespace
+
+/// One ray that Embree asks about, and how to ask the host about its hits.
+struct InstanceGeometry::Query {
+  RayContext& context;
+  EmbreeContext* given;  ///< the context that the host has passed, which its filters get
+  uint32_t instance;
+  unsigned geometry_id;
+  bool is_filtered;
+  AskFilters ask_filters;
+  const void* args;  ///< of the callback, for it
+
+  bool does_host_accept(EmbreeRayHit& ray_hit) const {
+    int valid = -1;
+    EmbreeFilterArguments asked{
+        &valid, nullptr, given, reinterpret_cast<RTCRayN*>(&ray_hit.ray), reinterpret_cast<RTCHitN*>(&ray_hit.hit), 1};
+    ask_filters(args, &asked);
+    return valid != 0;
+  }
+};
+
+namespace {
+
+/// The RayContext of a ray, whatever the host has passed; `fallback` if that has none.
+RayContext& context_of(EmbreeContext& given, const EmbreeRay& ray, std::optional<RayContext>& fallback) {
+  uint32_t mark;
+  std::memcpy(&mark, &given.flags, sizeof mark);
+  mark &= ~uint32_t{RTC_INTERSECT_CONTEXT_FLAG_COHERENT};
+  if (mark == detail::kRayContextMark) return reinterpret_cast<RayContext&>(given);
+  if (mark == detail::kRayContextsMark) {
+    auto& all = reinterpret_cast<RayContexts&>(given);
+    if (ray.id < all.count) return all.rays[ray.id];
+  }
+  fallback.emplace();
+  uint64_t seed = 0;
+  for (const float x : {ray.org_x, ray.org_y, ray.org_z, ray.dir_x, ray.dir_y, ray.dir_z}) {
+    seed = mix64(seed, std::bit_cast<uint32_t>(x));
+  }
+  fallback->path_seed = static_cast<uint32_t>(seed);
+  fallback->ray_seed = static_cast<uint32_t>(seed >> 32);
+  return *fallback;
+}
+
+/// The host's filter is not asked about what lies inside of instances.
+class WithoutFilter {
+ public:
+  explicit WithoutFilter(EmbreeContext& context) : context_(context), filter_(context.filter) {
+    if (filter_) context_.filter = nullptr;
+  }
+  ~WithoutFilter() {
+    if (filter_) context_.filter = filter_;
+  }
+  WithoutFilter(const WithoutFilter&) = delete;
+  WithoutFilter& operator=(const WithoutFilter&) = delete;
+
+ private:
+  EmbreeContext& context_;
+  RTCFilterFunctionN filter_;
+};
+
+}  // namespace
+
+/// The nearest hit in the instance that the host's filters accept.
+bool InstanceGeometry::intersect_filtered(const Query& query, EmbreeRayHit& ray_hit, HitRecord* record) const {
+  RayContext& context = query.context;
+  const auto intersect_once = [&] {
+    const WithoutFilter scope(context.embree);
+    return intersect(query.instance, query.geometry_id, ray_hit, context, &context.embree, record);
+  };
+  if (!query.is_filtered) return intersect_once();
+
+  const EmbreeRayHit before = ray_hit;
+  const std::optional<HitRecord> record_before = record ? std::optional(*record) : std::nullopt;
+  const uint32_t ray_seed = context.ray_seed;
+  bool is_accepted = false;
+  while (!is_accepted && intersect_once()) {
+    is_accepted = query.does_host_accept(ray_hit);
+    if (is_accepted) break;
+    const float behind = std::nextafter(ray_hit.ray.tfar, kInfinity);
+    ray_hit = before;
+    if (record) *record = *record_before;
+    if (!(behind < ray_hit.ray.tfar)) break;
+    ray_hit.ray.tnear = behind;
+    context.ray_seed = static_cast<uint32_t>(mix64(context.ray_seed, query.instance));  // of the flight that goes on
+  }
+  ray_hit.ray.tnear = before.ray.tnear;
+  context.ray_seed = ray_seed;
+  return is_accepted;
+}
+
 void InstanceGeometry::intersect_callback(const RTCIntersectFunctionNArguments* args) {
   const auto& self = *static_cast<const InstanceGeometry*>(args->geometryUserPtr);
-  auto& context = *reinterpret_cast<RayContext*>(args->context);
+  const auto intersect_one = [&](EmbreeRayHit& ray_hit, bool is_single) {
+    std::optional<RayContext> fallback;
+    RayContext& context = context_of(*args->context, ray_hit.ray, fallback);
+    const bool has_own = is_single || &context.embree != args->context;  // lanes that share one leave no record
+    const Query query{context,
+                      args->context,
+                      args->primID,
+                      args->geomID,
+                      self.has_filters || args->context->filter,
+                      ask_intersection_filters,
+                      args};
+    return self.intersect_filtered(query, ray_hit, has_own ? &context.hit : nullptr);
+  };
   if (args->N == 1) {
-    if (args->valid[0] == 0) return;
-    auto& ray_hit = *reinterpret_cast<EmbreeRayHit*>(args->rayhit);
-    self.intersect(args->primID, args->geomID, ray_hit, context, args->context, &context.hit);
+    if (args->valid[0] != 0) intersect_one(*reinterpret_cast<EmbreeRayHit*>(args->rayhit), true);
     return;
   }
   RTCRayN* rays = RTCRayHitN_RayN(args->rayhit, args->N);
@@ -254,7 +405,7 @@ void InstanceGeometry::intersect_callback(const RTCIntersectFunctionNArguments* 
     ray_hit.ray = rtcGetRayFromRayN(rays, args->N, lane);
     ray_hit.hit.geomID = kNoGeometry;
     ray_hit.hit.instID[0] = args->context->instID[0];
-    if (!self.intersect(args->primID, args->geomID, ray_hit, context, args->context, nullptr)) continue;
+    if (!intersect_one(ray_hit, false)) continue;
     RTCRayN_tfar(rays, args->N, lane) = ray_hit.ray.tfar;
     rtcCopyHitToHitN(hits, &ray_hit.hit, args->N, lane);
   }
@@ -262,17 +413,35 @@ void InstanceGeometry::intersect_callback(const RTCIntersectFunctionNArguments* 
 
 void InstanceGeometry::occluded_callback(const RTCOccludedFunctionNArguments* args) {
   const auto& self = *static_cast<const InstanceGeometry*>(args->geometryUserPtr);
-  const auto& context = *reinterpret_cast<const RayContext*>(args->context);
+  const auto is_occluded = [&](EmbreeRay& ray) {
+    std::optional<RayContext> fallback;
+    RayContext& context = context_of(*args->context, ray, fallback);
+    if (!self.has_filters && !args->context->filter) {
+      return self.occluded(args->primID, ray, context, &context.embree);
+    }
+    EmbreeRayHit ray_hit;  // filters want to know the hit
+    ray_hit.ray = ray;
+    ray_hit.hit.geomID = kNoGeometry;
+    ray_hit.hit.instID[0] = args->context->instID[0];
+    const Query query{context, args->context, args->primID, args->geomID, true, ask_occlusion_filters, args};
+    return self.intersect_filtered(query, ray_hit, nullptr);
+  };
   if (args->N == 1) {
-    if (args->valid[0] == 0) return;
-    self.occluded(args->primID, *reinterpret_cast<EmbreeRay*>(args->ray), context, args->context);
+    auto& ray = *reinterpret_cast<EmbreeRay*>(args->ray);
+    if (args->valid[0] != 0 && is_occluded(ray)) ray.tfar = -kInfinity;
     return;
   }
   for (unsigned lane = 0; lane < args->N; ++lane) {
     if (args->valid[lane] == 0) continue;
     EmbreeRay ray = rtcGetRayFromRayN(args->ray, args->N, lane);
-    if (self.occluded(args->primID, ray, context, args->context)) RTCRayN_tfar(args->ray, args->N, lane) = -kInfinity;
+    if (is_occluded(ray)) RTCRayN_tfar(args->ray, args->N, lane) = -kInfinity;
   }
+}
+
+void InstanceGeometry::set_hidden(uint32_t instance, bool is_hidden) {
+  if (!is_hidden && instance >= hidden.size()) return;
+  if (instance >= hidden.size()) hidden.resize(instances.size());
+  hidden[instance] = is_hidden;
 }
 
 EmbreeGeometry InstanceGeometry::create(EmbreeDeviceRef device) {

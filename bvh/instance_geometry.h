@@ -46,8 +46,8 @@ float largest_stretch(const mat4x3& local_to_world);
 Box3 instance_bounds(const InstanceRecord& instance, const TracedAsset& asset);
 
 /// Instances and assets, and the callbacks that Embree calls for them. Rays may run from any thread while nobody
-/// changes the tables. Single-ray queries must pass a RayContext's `embree` member as context; the scene must not be
-/// instanced itself.
+/// changes the tables. Queries should pass the `embree` member of a RayContext or of RayContexts as context; the scene
+/// must not be instanced itself.
 class InstanceGeometry {
  public:
   explicit InstanceGeometry(LevelSource& source) : source_(source) {}
@@ -55,9 +55,14 @@ class InstanceGeometry {
   std::vector<InstanceRecord> instances;
   std::vector<const TracedAsset*> assets;  ///< InstanceRecord::asset indexes it
   std::optional<float> forced_lambda;
+  bool has_filters = false;  ///< RuntimeOptions::has_geometry_filters
+  std::vector<bool> hidden;  ///< per instance, up to the last that no ray meets
 
-  /// A new user geometry over all instances, committed. Refers to this object. Call update() after
-  /// instances were added or moved.
+  bool is_hidden(uint32_t instance) const { return instance < hidden.size() && hidden[instance]; }
+  void set_hidden(uint32_t instance, bool is_hidden);
+
+  /// A new user geometry over all instances, committed. Refers to this object. Call update() after instances were
+  /// added, moved, hidden or shown.
   EmbreeGeometry create(EmbreeDeviceRef device);
   /// Tells Embree about the instances as they are now; the scene needs a commit too.
   void update(EmbreeGeometryRef geometry);
@@ -68,6 +73,12 @@ class InstanceGeometry {
   static void occluded_callback(const RTCOccludedFunctionNArguments* args);
 
   struct Visit;
+  static bool intersect_level(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
+                              EmbreeContext& embree_context, HitRecord& made);
+  static bool intersect_morph(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
+                              EmbreeContext& embree_context, HitRecord& made);
+  struct Query;
+  bool intersect_filtered(const Query& query, EmbreeRayHit& ray_hit, HitRecord* record) const;
   bool enter(uint32_t instance, const EmbreeRay& ray, const RayContext& context, Visit& visit) const;
   bool intersect(uint32_t instance, unsigned geometry_id, EmbreeRayHit& ray_hit, const RayContext& context,
                  EmbreeContext* embree_context, HitRecord* record) const;

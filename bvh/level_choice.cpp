@@ -31,10 +31,16 @@ std::optional<uint32_t> only_slot(const TracedAsset& asset, float footprint) {
   const std::vector<uint8_t>& usable = asset.usable_slots;
   for (size_t i = 0; i + 1 < usable.size(); ++i) {
     const float coarser = width_of_level(asset.level_numbers[usable[i + 1]]);
-    if (!(footprint > 0.5f * coarser)) return usable[i];  // also for NaN
+    if (!(footprint > asset.finest_blended * coarser)) return usable[i];  // also for NaN
     if (footprint < coarser) return {};
   }
   return usable.back();
+}
+
+/// A morph's t; 0 where it is as good as one of the levels, so that 1 / t and 1 / (1 - t) stay sane. Also for NaN.
+float blend_of(float t) {
+  constexpr float kLeast = 0x1p-20f;
+  return t >= kLeast && t <= 1 - kLeast ? t : 0.0f;
 }
 
 }  // namespace
@@ -46,15 +52,20 @@ SlotBlend split_slots(const TracedAsset& asset, float lambda) {
   if (i + 1 == usable.size()) return {usable[i], usable[i], 0.0f};
   // A level that is not there saves nothing over the finer one, which serves in its place.
   const float coarser = asset.level_numbers[usable[i + 1]];
-  return {usable[i], usable[i + 1], std::max(0.0f, lambda - (coarser - 1))};
+  return {usable[i], usable[i + 1], std::max(0.0f, lambda - (coarser - asset.blend_window)) / asset.blend_window};
+}
+
+uint32_t dissolve(const SlotBlend& slots, uint32_t instance, const RayContext& ray) {
+  return to_unit_float(mix64(ray.path_seed, instance)) < slots.blend ? slots.coarser : slots.slot;
 }
 
 LevelChoice choose_level(const TracedAsset& asset, const InstanceFootprint& footprint, uint32_t instance,
                          const RayContext& ray, float t_entry, const std::optional<float>& forced_lambda) {
   const RayCone cone{ray.cone_width, ray.cone_spread};
-  LevelChoice choice{0, std::max(footprint.camera_footprint, cone.diameter(t_entry))};
+  LevelChoice choice{0, 0.0f, std::max(footprint.camera_footprint, cone.diameter(t_entry))};
   if (ray.origin_instance == instance) {
     choice.slot = usable_near(asset, ray.origin_level_slot);
+    if (choice.slot == ray.origin_level_slot && asset.may_morph(choice.slot)) choice.blend = blend_of(ray.origin_blend);
     return choice;
   }
   if (!forced_lambda) {
@@ -64,8 +75,12 @@ LevelChoice choose_level(const TracedAsset& asset, const InstanceFootprint& foot
     }
   }
   const SlotBlend blend = split_slots(asset, lambda_of_choice(asset, footprint, choice, forced_lambda));
-  const float u = to_unit_float(mix64(ray.path_seed, instance));
-  choice.slot = u < blend.blend ? blend.coarser : blend.slot;
+  if (asset.may_morph(blend.slot)) {
+    choice.blend = blend_of(blend.blend);
+    choice.slot = blend.blend > 0.5f && choice.blend == 0 ? blend.coarser : blend.slot;
+  } else {
+    choice.slot = dissolve(blend, instance, ray);
+  }
   return choice;
 }
 

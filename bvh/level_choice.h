@@ -17,8 +17,8 @@ struct InstanceFootprint {
   float world_to_r0 = 0;       ///< pixel_error / instance scale: turns world footprints into local ones
 };
 
-/// The usable levels that lambda lies between: `slot`, and `coarser` for the share `blend` of paths. Levels blend over
-/// the one octave below the coarser of the two; before that, where levels are missing, the finer one serves alone.
+/// The usable levels that lambda lies between: `slot`, and `coarser` to the share `blend`. Levels blend over the
+/// asset's blend window, at most the octave below the coarser of the two; before that the finer one serves alone.
 /// lambda is clamped to what the plan allows and to the root.
 struct SlotBlend {
   uint32_t slot;
@@ -29,15 +29,20 @@ SlotBlend split_slots(const TracedAsset& asset, float lambda);
 
 struct LevelChoice {
   uint32_t slot;    ///< stored level
+  float blend;      ///< t of its morph to the next; 0: the level alone
   float footprint;  ///< world units: the wider of the camera's on the instance and the ray's cone where it enters
 };
 
 /// lambda is that of the wider of the camera's footprint on the instance and the ray's cone where it enters the
-/// instance's bounds (t_entry), no finer than the plan allows. Between two usable levels a < b the path sees b with
-/// probability max(0, lambda - (b - 1)), decided by path_seed and instance alone, so every ray of the path sees the
-/// same one. A ray that leaves a hit on this instance keeps that hit's level. forced_lambda replaces lambda.
+/// instance's bounds (t_entry), no finer than the plan allows. Between two usable levels the path sees their morph
+/// where the plan has it, else dissolve()d. A ray that leaves a hit on this instance keeps that hit's level and blend.
+/// forced_lambda replaces lambda.
 LevelChoice choose_level(const TracedAsset& asset, const InstanceFootprint& footprint, uint32_t instance,
                          const RayContext& ray, float t_entry, const std::optional<float>& forced_lambda);
+
+/// The coarser of two slots for the share `blend` of paths, decided by path_seed and instance alone, so every ray of a
+/// path sees the same one.
+uint32_t dissolve(const SlotBlend& slots, uint32_t instance, const RayContext& ray);
 
 /// The lambda of a choice: what was asked for, after the plan's clamp. For hits alone: most choices need no logarithm.
 float lambda_of_choice(const TracedAsset& asset, const InstanceFootprint& footprint, const LevelChoice& choice,

@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <vector>
 
 #include "base/result.h"
@@ -13,33 +12,27 @@
 
 namespace farfield {
 
-Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, EmbreeFilter filter, void* user) {
+Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, uint64_t most_bytes,
+                                     EmbreeFilter filter, void* user) {
   LevelScene result;
   if (!level.has_surface()) return result;
-
-  const std::lock_guard lock(device.build_mutex());
-  const uint64_t bytes_before = device.bytes();
-  device.reset_peak();
-  forget_embree_error(device.handle());  // not ours
-
-  const EmbreeGeometry quads = new_quads(device.handle());
-  share_array(quads.get(), level.positions);
-  share_array(quads.get(), level.quads);
-  if (filter) set_filter(quads.get(), filter, user);
-  result.scene_ = build_static_scene(device.handle(), quads.get());
-  FARFIELD_TRY(check_embree(device.handle(), fmt::format("build a BVH of {} quads", level.quads.size())));
-
-  const uint64_t bytes_after = device.bytes();
-  result.bytes_ = bytes_after - std::min(bytes_before, bytes_after) + kSceneOverheadBytes + kGeometryOverheadBytes;
-  result.build_peak_bytes_ = device.peak_bytes() - bytes_after;
+  const auto make = [&] {
+    std::vector<EmbreeGeometry> geometries;
+    geometries.push_back(new_quads(device.handle()));
+    const EmbreeGeometryRef quads = geometries.back().get();
+    share_array(quads, level.positions);
+    share_array(quads, level.quads);
+    if (filter) set_filter(quads, filter, user);
+    return geometries;
+  };
+  FARFIELD_TRY_LET(result.built_, build_measured_scene(device, make, most_bytes,
+                                                       fmt::format("the BVH of {} quads", level.quads.size())));
   return result;
 }
 
 LevelCost level_cost(const LevelView& level, const LevelScene& scene) {
-  // Checking the file has mapped all of it. What is not given back stays mapped and so never faults again, which would
-  // bring its neighbours back.
   const LevelFileSizes file = level_file_sizes(level);
-  return {file.mapped_bytes - file.build_only_bytes + scene.bytes(), file.build_only_bytes + scene.build_peak_bytes()};
+  return {file.memory_bytes - file.build_only_bytes + scene.bytes(), file.build_only_bytes + scene.build_peak_bytes()};
 }
 
 Result<LevelCost> measure_level_scene(BvhDevice& device, const LevelView& level) {

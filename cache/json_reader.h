@@ -4,12 +4,12 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
+#include "base/hash.h"
 #include "base/vec.h"
 
 namespace farfield {
@@ -59,13 +59,9 @@ class FieldReader {
   }
   /// Hashes are text: many JSON tools round integers above 2^53.
   uint64_t hash(const Json& object, const char* key, const std::string& where = "") {
-    const std::string digits = text(object, key, where);
-    uint64_t value = 0;
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);
-    if (digits.size() != 16 || error != std::errc() || end != digits.data() + digits.size()) {
-      fail(join(where, key), "a hash of 16 hexadecimal digits");
-    }
-    return value;
+    const std::optional<uint64_t> value = from_hex(text(object, key, where));
+    if (!value) fail(join(where, key), "a hash of 16 hexadecimal digits");
+    return value.value_or(0);
   }
   double number(const Json& value, const std::string& where) {
     if (!value.is_number()) return fail(where, "a number"), 0.0;

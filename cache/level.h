@@ -198,7 +198,7 @@ inline size_t brick_table_index(const ivec3& dims, const ivec3& brick) {
   ARRAY(31, VoxelAnisotropy,    voxel_anisotropy,     int8_t,            Voxels)        /* of all that a voxel of fog scatters; the header's, of what is scattered once */
 // clang-format on
 
-/// The arrays, owned (Array = std::vector<T>) while baking, or as spans into a mapped file at run time.
+/// The arrays, owned (Array = std::vector<T>) while baking, or as spans into a file in memory at run time.
 template <template <typename> class Array>
 struct LevelArrays {
 #define FARFIELD_FIELD(id, Name, field, Element, Group) Array<Element> field;
@@ -244,7 +244,7 @@ struct LevelData : LevelArrays<OwnedArray> {
   LevelHeader header;
 };
 
-/// A level whose arrays lie elsewhere (a mapped file, a LevelData): what rays read. Valid while its owner lives.
+/// A level whose arrays lie elsewhere (a LevelFile, a LevelData): what rays read. Valid while its owner lives.
 struct LevelView : LevelArrays<ArrayView> {
   LevelHeader header;
 };

@@ -106,51 +106,69 @@ LevelFileSizes level_file_sizes(const LevelView& level) {
   return {layout.file_bytes, round_up(layout.file_bytes, kPageBytes), build_only};
 }
 
-Result<std::unique_ptr<LevelFile>> LevelFile::map(const std::filesystem::path& path) {
+Result<std::unique_ptr<LevelFile>> LevelFile::read(const std::filesystem::path& path,
+                                                   std::optional<uint64_t> expected_bytes) {
   FARFIELD_TRY_LET(const auto file, open_regular_file(path));
+  if (expected_bytes && file.bytes != *expected_bytes) {
+    return make_error(ErrorCode::BadFile, fmt::format("broken level file {}: {} bytes where its manifest says {}; bake "
+                                                      "the asset again",
+                                                      path.string(), file.bytes, *expected_bytes));
+  }
   if (file.bytes == 0) {
     return make_error(ErrorCode::BadFile,
                       fmt::format("broken level file {}: it is empty; bake the asset again", path.string()));
   }
-  void* map = ::mmap(nullptr, file.bytes, PROT_READ, MAP_PRIVATE, file.descriptor.get(), 0);
-  if (map == MAP_FAILED) {
-    return make_error(ErrorCode::Io, fmt::format("cannot map {}: {}", path.string(), system_words(errno)));
+  // Pages of their own, not the heap's: parts of them are given back, and `ps` counts what the budget does.
+  void* pages = ::mmap(nullptr, file.bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (pages == MAP_FAILED) {
+    return make_error(ErrorCode::Io, fmt::format("cannot load {} into memory: {}", path.string(), system_words(errno)));
   }
-  std::unique_ptr<LevelFile> level(new LevelFile);  // owns the map from here on
-  level->map_ = static_cast<const std::byte*>(map);
-  level->map_bytes_ = file.bytes;
+  std::unique_ptr<LevelFile> level(new LevelFile);  // owns the pages from here on
+  level->bytes_ = static_cast<std::byte*>(pages);
+  level->file_bytes_ = file.bytes;
+  FARFIELD_TRY(read_fully(file.descriptor.get(), {level->bytes_, level->file_bytes_}, path));
+  ::mprotect(pages, file.bytes, PROT_READ);  // a failure only means that a stray write would not be noticed
   return level;
+}
+
+Result<void> LevelFile::parse(LevelCheck check, const std::filesystem::path& path) {
+  FARFIELD_TRY_LET(view_, parse_level(bytes(), check, path.string()));
+  return {};
 }
 
 Result<std::unique_ptr<LevelFile>> LevelFile::open(const std::filesystem::path& path, LevelCheck check) {
-  FARFIELD_TRY_LET(auto level, map(path));
-  FARFIELD_TRY_LET(level->view_, parse_level(level->bytes(), check, path.string()));
+  FARFIELD_TRY_LET(auto level, read(path));
+  FARFIELD_TRY(level->parse(check, path));
   return level;
 }
 
-Result<std::unique_ptr<LevelFile>> LevelFile::open_known(const std::filesystem::path& path, uint64_t file_hash) {
-  FARFIELD_TRY_LET(auto level, map(path));
+Result<std::unique_ptr<LevelFile>> LevelFile::open_known(const std::filesystem::path& path, uint64_t file_bytes,
+                                                         uint64_t file_hash) {
+  FARFIELD_TRY_LET(auto level, read(path, file_bytes));
   if (hash_bytes(level->bytes()) != file_hash) {
     // Not what the manifest means: damaged, which the checksums say better, or a sound file of another bake.
-    FARFIELD_TRY(parse_level(level->bytes(), LevelCheck::Full, path.string()));
+    FARFIELD_TRY(level->parse(LevelCheck::Full, path));
     return make_error(ErrorCode::BadFile, fmt::format("{} is not the file that its manifest meant when the asset was "
                                                       "opened; open it again, or bake it again",
                                                       path.string()));
   }
-  FARFIELD_TRY_LET(level->view_, parse_level(level->bytes(), LevelCheck::Values, path.string()));
+  FARFIELD_TRY(level->parse(LevelCheck::Values, path));
   return level;
 }
 
 LevelFile::~LevelFile() {
-  if (map_ != nullptr) ::munmap(const_cast<std::byte*>(map_), map_bytes_);
+  if (bytes_ != nullptr) ::munmap(bytes_, file_bytes_);
 }
 
 uint64_t LevelFile::build_only_bytes() const { return level_file_sizes(view_).build_only_bytes; }
 
-void LevelFile::release_build_pages() const {
+void LevelFile::release_build_pages() {
   for (const FileRange& pages : build_only_pages(layout_of(view_))) {
+    std::byte* const begin = bytes_ + pages.begin;
+    const uint64_t bytes = pages.end - pages.begin;
     // A failure (pages locked by the host, a system with larger pages) only means that the memory stays in use.
-    ::madvise(const_cast<std::byte*>(map_) + pages.begin, pages.end - pages.begin, MADV_DONTNEED);
+    ::madvise(begin, bytes, MADV_DONTNEED);
+    ::madvise(begin, bytes, MADV_NOHUGEPAGE);  // or the system may fill them again to make large pages
   }
 }
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Level files: one level, sections 64-byte aligned, usable in place from a read-only map. Layout: docs/file_format.md.
+// Level files: one level, sections 64-byte aligned, used in place once read. Layout: docs/file_format.md.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "base/result.h"
@@ -20,7 +21,7 @@ Result<uint64_t> write_level(const std::filesystem::path& path, const LevelData&
 /// What a level takes on disk and in memory, exact, before it is written.
 struct LevelFileSizes {
   uint64_t file_bytes = 0;
-  uint64_t mapped_bytes = 0;      ///< file_bytes rounded up to pages: resident once every byte was touched
+  uint64_t memory_bytes = 0;      ///< file_bytes rounded up to pages: what a LevelFile takes
   uint64_t build_only_bytes = 0;  ///< of those, what LevelFile::release_build_pages() gives back
 };
 LevelFileSizes level_file_sizes(const LevelView& level);
@@ -32,33 +33,39 @@ enum class LevelCheck {
   Full,       ///< and every section's checksum
 };
 
-/// A level file mapped read-only. Immutable; any thread may read it. The file must not be changed while mapped.
+/// A level file in memory. What was checked is what rays read, whatever happens to the file afterwards: the bytes are a
+/// copy (docs/decisions/0027-levels-are-copied.md), read-only once checked. Immutable; any thread may read it.
 class LevelFile {
  public:
-  /// Maps and checks a level file. Errors: NotFound, Io, BadFile (with offset and what was expected).
+  /// Reads and checks a level file. Errors: NotFound, Io (also if the file becomes shorter meanwhile), BadFile (with
+  /// offset and what was expected).
   static Result<std::unique_ptr<LevelFile>> open(const std::filesystem::path& path, LevelCheck check);
-  /// Maps and checks the file that a manifest means. All its bytes are read for their hash, once: that stands for the
-  /// sections' checksums. Errors: those of open(); BadFile if it is another file.
-  static Result<std::unique_ptr<LevelFile>> open_known(const std::filesystem::path& path, uint64_t file_hash);
+  /// Reads and checks the file that a manifest means, by its size and by the hash of all its bytes, which stands for
+  /// the sections' checksums. A file of another size takes no memory. Errors: those of open(); BadFile if it is another
+  /// file.
+  static Result<std::unique_ptr<LevelFile>> open_known(const std::filesystem::path& path, uint64_t file_bytes,
+                                                       uint64_t file_hash);
   ~LevelFile();
   LevelFile(const LevelFile&) = delete;
   LevelFile& operator=(const LevelFile&) = delete;
 
   const LevelView& view() const { return view_; }
-  uint64_t file_bytes() const { return map_bytes_; }
+  uint64_t file_bytes() const { return file_bytes_; }
   /// The whole file, for hashing.
-  std::span<const std::byte> bytes() const { return {map_, map_bytes_}; }
+  std::span<const std::byte> bytes() const { return {bytes_, file_bytes_}; }
   /// Bytes of the whole pages that hold only morph maps, which rays that dissolve between levels do not read, and
   /// positions and quads, unless faces have texture coordinates: then hits read them, else only a BVH build does.
   uint64_t build_only_bytes() const;
-  /// Gives those pages back to the system; they return from disk if touched again. Any thread.
-  void release_build_pages() const;
+  /// Gives those pages back to the system for good: what they held reads as zeros from then on. One thread.
+  void release_build_pages();
 
  private:
   LevelFile() = default;
-  static Result<std::unique_ptr<LevelFile>> map(const std::filesystem::path& path);
-  const std::byte* map_ = nullptr;  ///< file_bytes() long; owned
-  uint64_t map_bytes_ = 0;
+  static Result<std::unique_ptr<LevelFile>> read(const std::filesystem::path& path,
+                                                 std::optional<uint64_t> expected_bytes = {});
+  Result<void> parse(LevelCheck check, const std::filesystem::path& path);
+  std::byte* bytes_ = nullptr;  ///< file_bytes() of whole pages; owned
+  uint64_t file_bytes_ = 0;
   LevelView view_;
 };
 

@@ -30,7 +30,7 @@ inline constexpr uint32_t kLevelFileVersion = 6;
 inline constexpr std::array<uint8_t, 8> kLevelFileMagic = {0x89, 'F', 'F', 'L', 'V', '\r', '\n', 0x1a};
 inline constexpr uint64_t kSectionAlignment = 64;  ///< a cache line; Brick needs it
 inline constexpr uint64_t kPositionsPadding = 16;  ///< Embree reads 16 bytes at the last position
-inline constexpr uint64_t kPageBytes = 4096;       ///< the granularity in which mapped bytes become resident
+inline constexpr uint64_t kPageBytes = 4096;       ///< the granularity in which memory becomes resident
 
 inline uint64_t round_up(uint64_t value, uint64_t multiple_of) {
   return (value + multiple_of - 1) / multiple_of * multiple_of;

@@ -9,6 +9,7 @@
 
 #include "base/file_io.h"
 #include "base/hash.h"
+#include "base/json_words.h"
 #include "cache/json_reader.h"
 #include "cache/material_json.h"
 
@@ -57,7 +58,9 @@ Problem find_level_problem(const LevelEntry& level) {
   if (!is_plain_file_name(level.file)) {
     return fmt::format("\"{}\" is not a file name inside the folder", printable(level.file));
   }
-  for (const uint64_t bytes : {level.file_bytes, level.resident_bytes, level.build_peak_bytes}) {
+  const LevelCost morph = level.morph.value_or(LevelCost());
+  for (const uint64_t bytes :
+       {level.file_bytes, level.resident_bytes, level.build_peak_bytes, morph.resident_bytes, morph.build_peak_bytes}) {
     if (bytes > kMaxBytes) return fmt::format("{} bytes are more than any level has", bytes);
   }
   for (const uint64_t count : {level.triangles, level.voxels, level.bricks}) {
@@ -175,6 +178,9 @@ LevelEntry level_from_json(const Json& json, const std::string& where, FieldRead
   level.resident_bytes = read.count(json, "resident_bytes", where);
   level.build_peak_bytes = read.count(json, "build_peak_bytes", where);
   if (json.is_object() && json.contains("ray_cost")) level.ray_cost = read.number(json, "ray_cost", where);
+  if (json.is_object() && json.contains("morph_resident_bytes")) {
+    level.morph = {read.count(json, "morph_resident_bytes", where), read.count(json, "morph_build_peak_bytes", where)};
+  }
   if (json.is_object() && json.contains("errors")) {
     level.errors = errors_from_json(json["errors"], where + ".errors", read);
   }
@@ -269,6 +275,10 @@ OrderedJson to_json(const LevelEntry& level) {
                       {"resident_bytes", level.resident_bytes},
                       {"build_peak_bytes", level.build_peak_bytes}};
   if (level.ray_cost != 0) json["ray_cost"] = level.ray_cost;
+  if (level.morph) {
+    json["morph_resident_bytes"] = level.morph->resident_bytes;
+    json["morph_build_peak_bytes"] = level.morph->build_peak_bytes;
+  }
   if (level.errors) {
     OrderedJson errors = {{"occlusion_error", level.errors->occlusion_error}};
     add_error_size(errors, "occlusion_rms", level.errors->occlusion_rms);
@@ -315,6 +325,23 @@ std::string manifest_to_json(const Manifest& manifest) {
   return json.dump(2, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
 }
 
+namespace {
+
+constexpr std::string_view kTextEnd = "\n}\n";
+constexpr std::string_view kChecksumBegin = ",\n  \"checksum\": \"";
+
+/// How a text ends that has the hash of all that comes before.
+std::string end_with_checksum(std::string_view body) {
+  return fmt::format("{}{}\"{}", kChecksumBegin, to_hex(hash_values(std::span(body))), kTextEnd);
+}
+
+bool is_checksum_right(std::string_view text) {
+  const size_t end = text.rfind(kChecksumBegin);
+  return end != std::string_view::npos && text.substr(end) == end_with_checksum(text.substr(0, end));
+}
+
+}  // namespace
+
 Result<Manifest> manifest_from_json(std::string_view text, std::string_view name) {
   const auto broken = [&](std::string_view problem) {
     return make_error(ErrorCode::BadFile, fmt::format("broken manifest {}: {}; bake the asset again", name, problem));
@@ -324,7 +351,7 @@ Result<Manifest> manifest_from_json(std::string_view text, std::string_view name
   try {
     json = Json::parse(text);
   } catch (const Json::exception& error) {  // the only way to learn where the syntax is wrong
-    return broken(printable(error.what()));
+    return broken(printable(json_words(error.what())));
   }
 
   FieldReader read;
@@ -335,10 +362,15 @@ Result<Manifest> manifest_from_json(std::string_view text, std::string_view name
                                   name, version, kFormatVersion));
   }
   if (!read.problem && version == 0) read.problem = "the format version is 0";
+  const bool has_checksum = json.contains("checksum");
+  if (!read.problem && has_checksum && !is_checksum_right(text)) {
+    read.problem = "its checksum is wrong, it was changed since it was written";
+  }
   Manifest manifest = manifest_from_json(json, read);
   if (!read.problem) read.problem = find_problem(manifest);
   if (read.problem) return broken(*read.problem);
   manifest.version = static_cast<int>(version);
+  manifest.has_checksum = has_checksum;
   return manifest;
 }
 
@@ -369,7 +401,9 @@ Result<void> write_manifest(const fs::path& asset_dir, const Manifest& manifest)
   if (const Problem problem = find_problem(manifest)) {
     return make_error(ErrorCode::InvalidArgument, fmt::format("cannot write {}: {}", path.string(), *problem));
   }
-  const std::string text = manifest_to_json(manifest);
+  std::string text = manifest_to_json(manifest);
+  text.resize(text.size() - kTextEnd.size());
+  text += end_with_checksum(text);
   const std::span<const std::byte> bytes = std::as_bytes(std::span(text));
   return write_file_atomically(path, std::span(&bytes, 1));
 }

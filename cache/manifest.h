@@ -13,6 +13,7 @@
 #include "base/result.h"
 #include "base/vec.h"
 #include "cache/asset_material.h"
+#include "cache/level.h"
 
 namespace farfield {
 
@@ -51,9 +52,10 @@ struct LevelEntry {
   uint64_t triangles = 0;
   uint64_t voxels = 0;
   uint64_t bricks = 0;
-  uint64_t resident_bytes = 0;    ///< mapped bytes that stay, plus BVH, once loaded
-  uint64_t build_peak_bytes = 0;  ///< further bytes needed while the BVH is built
-  double ray_cost = 0;            ///< work of a ray (bvh/ray_cost.h), >= 0; 0: not recorded
+  uint64_t resident_bytes = 0;     ///< bytes of the file that stay, plus BVH, once loaded
+  uint64_t build_peak_bytes = 0;   ///< further bytes needed while the BVH is built
+  double ray_cost = 0;             ///< work of a ray (bvh/ray_cost.h), >= 0; 0: not recorded
+  std::optional<LevelCost> morph;  ///< what the morph from the next finer stored level takes; absent: not recorded
   std::optional<LevelErrors> errors;
 };
 
@@ -76,6 +78,7 @@ struct Manifest {
   std::vector<AssetTexture> textures;
   std::vector<AssetMaterial> materials;  ///< LevelArrays::face_material indexes it
   std::vector<LevelEntry> levels;
+  bool has_checksum = false;  ///< it was read from a file that has one, and that is right; older ones have none
 };
 
 /// The box in the source's space around a box of positions.
@@ -83,7 +86,8 @@ Box3 in_source_space(const Box3& bounds, const Manifest& manifest);
 
 /// Reads DIR/manifest.json. Untrusted: sizes, ranges and names are checked (a level's file may not leave the folder).
 /// Every byte size is at most 2^50, so that sums over assets cannot overflow.
-/// Errors: NotFound, Io, BadFile, Unsupported (newer format version).
+/// Errors: NotFound, Io, BadFile (also a file that was changed since it was written), Unsupported (newer format
+/// version).
 Result<Manifest> read_manifest(const std::filesystem::path& asset_dir);
 
 /// Whose DIR/manifest.json is, however damaged or new: browsers, package managers and others write files of this name.
@@ -94,11 +98,12 @@ enum class ManifestWriter {
 };
 ManifestWriter manifest_writer(const std::filesystem::path& asset_dir);
 
-/// Writes DIR/manifest.json atomically (temporary name, sync, rename). Errors: Io, InvalidArgument (a manifest that
-/// read_manifest() would refuse).
+/// Writes DIR/manifest.json atomically (temporary name, sync, rename), with a checksum of its text at the end. Errors:
+/// Io, InvalidArgument (a manifest that read_manifest() would refuse).
 Result<void> write_manifest(const std::filesystem::path& asset_dir, const Manifest& manifest);
 
-/// The same without files: the text of a manifest, and the manifest of a text. name: for messages.
+/// The same without files: the text of a manifest, without a checksum, and the manifest of a text, whose checksum must
+/// be right if it has one. name: for messages.
 std::string manifest_to_json(const Manifest& manifest);
 Result<Manifest> manifest_from_json(std::string_view text, std::string_view name);
 

@@ -27,11 +27,11 @@ uint64_t excess(uint64_t actual, uint64_t planned) { return actual > planned ? a
 
 /// Runs a load. An exception (out of memory, as a rule) becomes an Error: if it passed, the waiting threads would wait
 /// for ever.
-Result<LoadedItem> run_load(const std::function<Result<LoadedItem>()>& load) {
+Result<LoadedItem> run_load(const ResidencyItem& item, uint64_t bytes_left) {
   Result<LoadedItem> loaded;
   run_isolated([&] {
     try {
-      loaded = load();
+      loaded = item.load(bytes_left);
     } catch (const std::exception& exception) {
       loaded = make_error(ErrorCode::Io, fmt::format("loading failed: {}", exception.what()));
     }
@@ -73,10 +73,11 @@ void ResidentSet::load(size_t index, std::unique_lock<std::mutex>& lock) {
   is_loading_ = true;
   item.state.store(ItemState::Loading, std::memory_order_relaxed);
   const Result<void> reserved = reserve(item);
+  const uint64_t bytes_left = budget_bytes_ - std::min(budget_bytes_, stats_.accounted_bytes);
 
   lock.unlock();
   const auto start = std::chrono::steady_clock::now();
-  Result<LoadedItem> loaded = reserved ? run_load(item.planned.load) : tl::unexpected(reserved.error());
+  Result<LoadedItem> loaded = reserved ? run_load(item.planned, bytes_left) : tl::unexpected(reserved.error());
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   lock.lock();
 

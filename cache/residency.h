@@ -8,7 +8,8 @@
 //   item being loaded, build peak included, which are reserved before its load starts. One load runs at a time, so one
 //   build peak is reserved at a time. When a load ends, what it says it really takes replaces the plan; the difference
 //   is counted in Stats::unplanned_bytes. The budget is hard: a load whose reservation does not fit is not started,
-//   and one that turns out to take too much is undone. Both make the item Refused until it is released.
+//   and one that turns out to take more than is left stops there, as it is told how much that is. Both make the item
+//   Refused until it is released.
 // Who locks. acquire() of a Ready item is one atomic load (acquire), no lock. Otherwise one mutex guards states and
 //   sums. It is never held while loading, reporting or destroying. Threads that need an item being loaded wait on a
 //   condition variable; the first thread that needs an Empty item loads it itself.
@@ -47,8 +48,9 @@ struct LoadedItem {
 struct ResidencyItem {
   uint64_t resident_bytes = 0;
   uint64_t build_peak_bytes = 0;
-  /// Called by the one thread that loads; may use parallel_for and TBB; may be called again after a release.
-  std::function<Result<LoadedItem>()> load;
+  /// Called by the one thread that loads, with what the budget has left: more it must not take even for a moment, but
+  /// fail with OutOfBudget. May use parallel_for and TBB; may be called again after a release.
+  std::function<Result<LoadedItem>(uint64_t bytes_left)> load;
 };
 
 enum class ItemState : uint8_t {

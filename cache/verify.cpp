@@ -5,12 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <set>
 
 #include "base/file_io.h"
 #include "base/hash.h"
+#include "cache/hull_check.h"
 #include "cache/level_file.h"
 #include "cache/manifest.h"
 
@@ -28,7 +28,7 @@ struct FinerLevel {
 
 class Verifier {
  public:
-  explicit Verifier(const fs::path& folder) : folder_(folder) {}
+  Verifier(const fs::path& folder, const MeasureCost& measure) : folder_(folder), measure_(measure) {}
 
   VerifyResult run() {
     const Result<Manifest> manifest = read_manifest(folder_);
@@ -38,6 +38,13 @@ class Verifier {
       return result_;
     }
     manifest_ = &*manifest;
+    file_ = kManifestName;
+    if (!manifest->has_checksum) {
+      add(Finding::Severity::Warning,
+          fmt::format("{}: it has no checksum, it was written by an older Farfield; bake the "
+                      "asset again to have one",
+                      file_));
+    }
     std::optional<FinerLevel> finer;
     for (const LevelEntry& entry : manifest->levels) {
       finer = check_level(entry, finer, entry.level == manifest->levels.front().level);
@@ -83,6 +90,7 @@ class Verifier {
     expect_count("the level's number", entry.level, level.header.level);
     check_resolution(entry, level);
     check_resident_bytes(entry, level);
+    if (measure_) check_cost(entry, level);
     check_bounds(level);
     check_hull(level);
     check_morph(level, finer, is_first);
@@ -115,10 +123,24 @@ class Verifier {
   /// The planner trusts this figure: at least the pages that rays read must be in it.
   void check_resident_bytes(const LevelEntry& entry, const LevelView& level) {
     const LevelFileSizes sizes = level_file_sizes(level);
-    const uint64_t least = sizes.mapped_bytes - sizes.build_only_bytes;
+    const uint64_t least = sizes.memory_bytes - sizes.build_only_bytes;
     if (entry.resident_bytes >= least) return;
     error(fmt::format("{}: the manifest counts {} resident bytes, but rays alone touch {}; bake the asset again", file_,
                       entry.resident_bytes, least));
+  }
+
+  void check_cost(const LevelEntry& entry, const LevelView& level) {
+    const Result<LevelCost> cost = measure_(level);
+    if (!cost) return error(fmt::format("{}: it cannot be loaded: {}", file_, cost.error().message));
+    const uint64_t measured = cost->resident_bytes + cost->build_peak_bytes;
+    const uint64_t promised = entry.resident_bytes + entry.build_peak_bytes;
+    if (measured == promised && cost->resident_bytes == entry.resident_bytes) return;
+    const bool is_lie = promised / 2 < measured / 3;
+    add(is_lie ? Finding::Severity::Error : Finding::Severity::Warning,
+        fmt::format(
+            "{}: it takes {} bytes, and {} more while it is loaded; the manifest says {} and {}; bake the asset "
+            "again on this kind of processor",
+            file_, cost->resident_bytes, cost->build_peak_bytes, entry.resident_bytes, entry.build_peak_bytes));
   }
 
   void check_bounds(const LevelView& level) {
@@ -130,49 +152,10 @@ class Verifier {
     if (!inside) error(fmt::format("{}: it reaches out of the manifest's bounds; bake the asset again", file_));
   }
 
-  /// Instances are bounded by the hull: what lies outside of it is cut off. Tested along directions all around, which
-  /// finds anything that sticks out visibly.
   void check_hull(const LevelView& level) {
-    if (manifest_->hull.empty()) return;  // then the bounds serve
-    constexpr int kDirections = 64;
-    const float slack = 1e-4f * glm::length(manifest_->bounds.size());
-    std::vector<vec3> points = voxel_centers(level);
-    points.insert(points.end(), level.positions.begin(), level.positions.end());
-    for (int i = 0; i < kDirections; ++i) {
-      const vec3 direction = fibonacci_direction(i, kDirections);
-      const float reach = reach_along(direction, points);
-      const float hull_reach = reach_along(direction, manifest_->hull);
-      if (reach <= hull_reach + slack) continue;
-      error(
-          fmt::format("{}: it reaches {} out of the manifest's hull; bake the asset again", file_, reach - hull_reach));
-      return;
-    }
-  }
-
-  static std::vector<vec3> voxel_centers(const LevelView& level) {
-    std::vector<vec3> centers;
-    for_each_brick(level, [&](const Brick& brick, const ivec3& coordinates) {
-      const ivec3 corner = coordinates * kBrickSide;
-      for (int i = 0; i < kBrickVoxels; ++i) {
-        if (brick.density[static_cast<size_t>(i)] == 0) continue;
-        const ivec3 voxel = corner + ivec3(i % 8, i / 8 % 8, i / 64);
-        centers.push_back(level.header.volume_origin + (vec3(voxel) + 0.5f) * level.header.resolution);
-      }
-    });
-    return centers;
-  }
-
-  static vec3 fibonacci_direction(int i, int count) {
-    const float z = 1.0f - (2.0f * static_cast<float>(i) + 1.0f) / static_cast<float>(count);
-    const float phi = 2.39996323f * static_cast<float>(i);  // the golden angle
-    const float radius = std::sqrt(1.0f - z * z);
-    return {radius * std::cos(phi), radius * std::sin(phi), z};
-  }
-
-  static float reach_along(const vec3& direction, std::span<const vec3> points) {
-    float reach = -std::numeric_limits<float>::infinity();
-    for (const vec3& point : points) reach = std::max(reach, glm::dot(direction, point));
-    return reach;
+    const float reach = reach_out_of_hull(level, manifest_->hull);
+    if (reach <= hull_slack(manifest_->bounds)) return;
+    error(fmt::format("{}: it reaches {} out of the manifest's hull; bake the asset again", file_, reach));
   }
 
   /// A morph map has an entry for each vertex and face of the next finer stored level, or is absent.
@@ -208,6 +191,7 @@ class Verifier {
   }
 
   const fs::path& folder_;
+  const MeasureCost& measure_;
   const Manifest* manifest_ = nullptr;
   std::string file_;  ///< what is being checked
   VerifyResult result_;
@@ -219,6 +203,8 @@ bool VerifyResult::is_sound() const {
   return std::ranges::none_of(findings, [](const Finding& f) { return f.severity == Finding::Severity::Error; });
 }
 
-VerifyResult verify_asset(const fs::path& asset_dir) { return Verifier(asset_dir).run(); }
+VerifyResult verify_asset(const fs::path& asset_dir, const MeasureCost& measure) {
+  return Verifier(asset_dir, measure).run();
+}
 
 }  // namespace farfield

@@ -4,8 +4,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
+
+#include "base/result.h"
+#include "cache/level.h"
 
 namespace farfield {
 
@@ -28,7 +32,12 @@ struct VerifyResult {
   bool is_sound() const;
 };
 
-/// Reads the whole folder. Never fails: whatever goes wrong is a finding. Any thread; nobody may write meanwhile.
-VerifyResult verify_asset(const std::filesystem::path& asset_dir);
+/// What a level takes once loaded, measured. Errors: what went wrong.
+using MeasureCost = std::function<Result<LevelCost>(const LevelView&)>;
+
+/// Reads the whole folder. Never fails: whatever goes wrong is a finding. With `measure`, what levels take is held
+/// against the manifest: less than two thirds of it there is an error, any other difference a warning, as BVHs differ
+/// between processors. Any thread; nobody may write meanwhile.
+VerifyResult verify_asset(const std::filesystem::path& asset_dir, const MeasureCost& measure = {});
 
 }  // namespace farfield

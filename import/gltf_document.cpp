@@ -8,6 +8,7 @@
 #include <set>
 
 #include "base/hash.h"
+#include "base/json_words.h"
 #include "base/result.h"
 #include "import/gltf_json.h"
 #include "import/read_file.h"
@@ -338,6 +339,9 @@ Result<GltfDocument> open_gltf(std::span<const unsigned char> bytes, const fs::p
   document.name = path.string();
   document.buffer_files = std::make_unique<GltfBufferFiles>();
   const bool is_binary = is_binary_gltf(bytes);
+  if (!is_binary && !may_be_json(bytes)) {
+    return document.bad("it is no glTF, neither a JSON object nor binary: give a .gltf or .glb");
+  }
   if (is_too_deep(json_text(bytes))) {
     return document.bad(fmt::format("JSON is nested deeper than {} levels", kMaxJsonDepth));
   }
@@ -370,7 +374,7 @@ Result<GltfDocument> open_gltf(std::span<const unsigned char> bytes, const fs::p
     return make_error(ErrorCode::Unsupported,
                       fmt::format("{}: glTF {}; convert it to glTF 2.0", document.name, document.model.asset.version));
   }
-  if (!ok) return document.bad(first_line(error));
+  if (!ok) return document.bad(json_words(first_line(error)));
   document.files = std::move(access.files);
   document.warnings = warn_of_unknown_extensions(document.model);
 

@@ -24,6 +24,13 @@ bool is_binary_gltf(std::span<const unsigned char> bytes) {
   return bytes.size() >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0;
 }
 
+bool may_be_json(std::span<const unsigned char> text) {
+  constexpr unsigned char kByteOrderMark[] = {0xef, 0xbb, 0xbf};
+  if (text.size() >= 3 && std::equal(text.begin(), text.begin() + 3, kByteOrderMark)) text = text.subspan(3);
+  const auto begin = std::ranges::find_if_not(text, [](unsigned char c) { return std::strchr(" \t\r\n", c) && c; });
+  return begin != text.end() && *begin == '{';
+}
+
 std::span<const unsigned char> json_text(std::span<const unsigned char> bytes) {
   return is_binary_gltf(bytes) ? chunk_at(bytes, kHeaderBytes) : bytes;
 }

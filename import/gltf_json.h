@@ -12,6 +12,8 @@ namespace farfield {
 inline constexpr int kMaxJsonDepth = 200;
 
 bool is_binary_gltf(std::span<const unsigned char> bytes);
+/// Whether the text begins as a JSON object does.
+bool may_be_json(std::span<const unsigned char> text);
 /// The JSON text of a .glb, or all of a .gltf.
 std::span<const unsigned char> json_text(std::span<const unsigned char> bytes);
 /// The binary chunk of a .glb; empty where there is none.

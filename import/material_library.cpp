@@ -96,9 +96,10 @@ Result<void> MaterialLibraries::finish() {
     defined_.insert(used->second);
   }
   for (const auto& [name, index] : by_name_) {
+    const std::string wanted = lower_case(name);
     if (name.empty() || latest.contains(name)) continue;
     const auto similar =
-        std::ranges::find_if(latest, [&](const auto& entry) { return lower_case(entry.first) == lower_case(name); });
+        std::ranges::find_if(latest, [&](const auto& entry) { return lower_case(entry.first) == wanted; });
     if (similar != latest.end()) {
       warn(fmt::format("material {} is taken for {}, which differs in upper and lower case", name, similar->first));
       mesh_.materials[index] = convert(*similar->second, uv_[index]);

@@ -51,7 +51,8 @@ std::optional<std::string> find_problem(const PlanAsset& asset) {
   if (levels == 0) return "it has no levels";
   if (levels > kMostLevels) return "it has more than 256 levels";
   if (asset.build_peak_bytes.size() != levels || asset.lambda.size() != levels) return "its lists differ in length";
-  if (!has_length(asset.ray_cost) || !has_length(asset.demand)) return "its lists differ in length";
+  if (!has_length(asset.ray_cost) || !has_length(asset.demand) || !has_length(asset.morphs))
+    return "its lists differ in length";
   for (size_t i = 0; i < levels; ++i) {
     if (!std::isfinite(asset.lambda[i])) return "a level's lambda is not finite";
     if (i > 0 && !(asset.lambda[i] > asset.lambda[i - 1])) return "its levels are not sorted by lambda";
@@ -167,6 +168,16 @@ class Choice {
     }
     return pixels;
   }
+  /// The morph from a usable level to the next usable one; none if levels lie between them.
+  std::optional<MorphSize> morph(uint8_t level, uint8_t next) const {
+    return asset_.morphs.empty() || next != level + 1 ? std::nullopt : asset_.morphs[level];
+  }
+  /// Pixels of the instances that may see a level blended with the next.
+  double pixels_blended(uint8_t level) const {
+    if (level >= asset_.demand.size()) return 0;
+    const LevelDemand& demand = asset_.demand[level];
+    return demand.coarsest_lambda > asset_.lambda[level + 1u] - 1 ? demand.pixels : 0;
+  }
   uint64_t level_bytes(uint8_t level) const { return asset_.resident_bytes[level]; }
   uint64_t level_peak(uint8_t level) const { return asset_.build_peak_bytes[level]; }
 
@@ -269,7 +280,7 @@ Draft best_under(std::span<const Choice> choices, const Draft& roots, const Draf
   return best;
 }
 
-/// A level that may be added for speed: in place of the asset's finest, or beside it.
+/// A level that may be added for speed: in place of the asset's finest, or beside it. Or a morph from that level.
 struct Extra {
   double pixels_per_byte;
   size_t asset;
@@ -277,7 +288,7 @@ struct Extra {
   bool is_finest;
 };
 
-/// Adds what fits of `extras`, those first that most pixels see per byte.
+/// Adds what fits of what is not needed, that first which most pixels see per byte.
 class SpeedUp {
  public:
   SpeedUp(std::span<const Choice> choices, const Draft& draft, Bytes budget)
@@ -309,11 +320,33 @@ class SpeedUp {
     for (std::vector<uint8_t>& levels : usable_) std::sort(levels.begin(), levels.end());
   }
 
+  /// Morphs between usable neighbours.
+  void add_morphs() {
+    morphs_.resize(choices_.size());
+    peak_ = peak();
+    std::vector<Extra> extras;
+    for (size_t i = 0; i < choices_.size(); ++i) {
+      for (size_t k = 0; k + 1 < usable_[i].size(); ++k) {
+        const uint8_t level = usable_[i][k];
+        const auto morph = choices_[i].morph(level, usable_[i][k + 1]);
+        const double pixels = choices_[i].pixels_blended(level);
+        if (morph && pixels > 0) {
+          extras.push_back({pixels / (1.0 + static_cast<double>(morph->resident_bytes)), i, level, false});
+        }
+      }
+    }
+    sort_by_worth(extras);
+    for (const Extra& extra : extras) add_morph(extra);
+    for (std::vector<uint8_t>& levels : morphs_) std::sort(levels.begin(), levels.end());
+  }
+
   const std::vector<std::vector<uint8_t>>& usable() const { return usable_; }
+  const std::vector<std::vector<uint8_t>>& morphs() const { return morphs_; }
+  uint32_t morphs_given_up() const { return morphs_given_up_; }
   Bytes resident() const { return resident_; }
   /// Of the largest build among what is usable now.
   uint64_t peak() const {
-    uint64_t peak = 0;
+    uint64_t peak = morph_peak_;
     for (size_t i = 0; i < choices_.size(); ++i) {
       for (const uint8_t level : usable_[i]) peak = std::max(peak, choices_[i].level_peak(level));
     }
@@ -325,9 +358,24 @@ class SpeedUp {
     const double bytes = 1.0 + static_cast<double>(choices_[asset].level_bytes(level));
     extras.push_back({pixels / bytes, asset, level, is_finest});
   }
-  void take_what_fits(std::vector<Extra>& extras) {
+  static void sort_by_worth(std::vector<Extra>& extras) {
     std::stable_sort(extras.begin(), extras.end(),
                      [](const Extra& a, const Extra& b) { return a.pixels_per_byte > b.pixels_per_byte; });
+  }
+  void add_morph(const Extra& extra) {
+    const MorphSize size = *choices_[extra.asset].morph(extra.level, static_cast<uint8_t>(extra.level + 1));
+    const uint64_t peak = std::max(peak_, size.build_peak_bytes);
+    if (resident_ + size.resident_bytes + peak > budget_) {
+      ++morphs_given_up_;
+      return;
+    }
+    resident_ += size.resident_bytes;
+    peak_ = peak;
+    morph_peak_ = std::max(morph_peak_, size.build_peak_bytes);
+    morphs_[extra.asset].push_back(extra.level);
+  }
+  void take_what_fits(std::vector<Extra>& extras) {
+    sort_by_worth(extras);
     for (const Extra& extra : extras) {
       const Choice& choice = choices_[extra.asset];
       const Bytes given_back = extra.is_finest ? choice.bytes(finest_[extra.asset]) : 0;
@@ -347,8 +395,11 @@ class SpeedUp {
   std::span<const Choice> choices_;
   std::vector<uint8_t> finest_;
   std::vector<std::vector<uint8_t>> usable_;
+  std::vector<std::vector<uint8_t>> morphs_;
+  uint32_t morphs_given_up_ = 0;
   Bytes resident_;
   uint64_t peak_;
+  uint64_t morph_peak_ = 0;
   Bytes budget_;
 };
 
@@ -404,9 +455,12 @@ Result<Plan> plan_levels(std::span<const PlanAsset> assets, uint64_t budget_byte
   SpeedUp speed_up(choices, best, budget);
   speed_up.refine_for_speed();
   speed_up.coarsen_for_speed();
+  speed_up.add_morphs();
 
   Plan plan;
   plan.usable = speed_up.usable();
+  plan.morphs = speed_up.morphs();
+  plan.morphs_given_up = speed_up.morphs_given_up();
   plan.resident_bytes = saturated(speed_up.resident());
   plan.build_peak_bytes = speed_up.peak();
   plan.asked_bytes = saturated(asked.resident + asked.peak + fixed_bytes);

@@ -23,7 +23,7 @@ AssetView::AssetView() : impl_(std::make_unique<Impl>()) {}
 AssetView::~AssetView() = default;
 
 Result<std::unique_ptr<AssetView>> AssetView::open(const std::filesystem::path& folder, float lambda,
-                                                   uint64_t budget_bytes) {
+                                                   uint64_t budget_bytes, Blend blend) {
   std::unique_ptr<AssetView> view(new AssetView);
   Impl& impl = *view->impl_;
   FARFIELD_TRY_LET(impl.device, make_embree_device(thread_count()));  // as many threads as parallel_for uses
@@ -31,6 +31,7 @@ Result<std::unique_ptr<AssetView>> AssetView::open(const std::filesystem::path& 
   RuntimeOptions options;
   options.budget_bytes = budget_bytes;
   options.forced_lambda = lambda;
+  options.blend = blend;
   FARFIELD_TRY_LET(auto runtime, Runtime::create(impl.device.get(), options));
   impl.runtime = std::move(runtime);
 

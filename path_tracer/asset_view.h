@@ -48,7 +48,8 @@ class AssetView {
   /// folder: a baked asset. lambda: forced for every ray, 0 is the source; values between two levels blend them.
   /// Errors: those of Runtime::create, open_asset and plan_frame.
   static Result<std::unique_ptr<AssetView>> open(const std::filesystem::path& folder, float lambda,
-                                                 uint64_t budget_bytes = uint64_t{1} << 36);
+                                                 uint64_t budget_bytes = uint64_t{1} << 36,
+                                                 Blend blend = Blend::Dissolve);
   ~AssetView();
   AssetView(const AssetView&) = delete;
   AssetView& operator=(const AssetView&) = delete;

@@ -49,4 +49,14 @@ std::optional<std::string> budget_notice(const RenderReport& report) {
       format_bytes(asked));
 }
 
+std::optional<std::string> morph_notice(const RenderReport& report) {
+  const auto frames =
+      std::ranges::count_if(report.frames, [](const FrameReport& frame) { return frame.morphs_given_up > 0; });
+  if (frames == 0) return std::nullopt;
+  const FrameReport& worst = *std::ranges::max_element(report.frames, {}, &FrameReport::morphs_given_up);
+  return fmt::format(
+      "the budget of {} has no room for {} morphs in frame {}: those levels dissolve; in {} of {} frames",
+      format_bytes(report.budget_bytes), worst.morphs_given_up, worst.frame, frames, report.frames.size());
+}
+
 }  // namespace farfield

@@ -61,7 +61,9 @@ std::string make_fingerprint(const RenderOptions& options, std::span<const fs::p
       options.budget_bytes, options.pixel_error, static_cast<int>(options.blend), options.full_detail,
       options.exposure_stops, options.cryptomatte, options.camera, options.frames_per_second, identity(options.scene),
       identity(options.environment), options.sky);
-  if (options.turn_sun) text += " sun turned";  // said only then: shots from before know no other
+  // Said only where they differ: shots from before know no others.
+  if (options.turn_sun) text += " sun turned";
+  if (options.blend_window != 1.0f) text += fmt::format(" blend window {}", options.blend_window);
   for (const fs::path& folder : asset_folders)
     if (!folder.empty()) text += fmt::format(" {}:{}", folder.filename().string(), to_hex(manifest_hash(folder)));
   return text;
@@ -95,10 +97,12 @@ Metadata frame_metadata(const RenderOptions& options, const GltfScene& scene, co
   return metadata;
 }
 
+bool same_instances(std::span<const GltfInstance> a, std::span<const GltfInstance> b) {
+  return std::ranges::equal(a, b, {}, &GltfInstance::mesh, &GltfInstance::mesh);
+}
+
 bool same_places(std::span<const GltfInstance> a, std::span<const GltfInstance> b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const GltfInstance& x, const GltfInstance& y) {
-    return x.mesh == y.mesh && x.to_world == y.to_world;
-  });
+  return std::ranges::equal(a, b, {}, &GltfInstance::to_world, &GltfInstance::to_world);
 }
 
 /// The instances of one frame after the other. Those of a scene where none moves are the scene's own: a copy of a
@@ -108,13 +112,16 @@ class PlacedInstances {
   explicit PlacedInstances(const GltfScene& scene) : scene_(scene), do_move_(scene.do_instances_move()) {}
 
   std::span<const GltfInstance> get() const { return do_move_ ? std::span(placed_) : std::span(scene_.instances); }
-  /// True if some stand elsewhere than before.
-  bool move_to(double seconds) {
-    if (!do_move_) return false;
+  enum class Change { None, Places, Instances };
+  /// What is different from before: nothing, where they stand, or which there are.
+  Change move_to(double seconds) {
+    if (!do_move_) return Change::None;
     std::vector<GltfInstance> placed = scene_.instances_at(seconds);
-    const bool did_move = !same_places(placed, placed_);
+    const Change change = !same_instances(placed, placed_) ? Change::Instances
+                          : !same_places(placed, placed_)  ? Change::Places
+                                                           : Change::None;
     placed_ = std::move(placed);
-    return did_move;
+    return change;
   }
 
  private:
@@ -190,7 +197,10 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
   PlacedInstances instances(scene_);
   for (size_t i = 0; i < frames.size(); ++i) {
     const double seconds = scene_.seconds_of_frame(frames[i]);
-    if (const bool did_move = instances.move_to(seconds); did_move || !session) {
+    const PlacedInstances::Change change = instances.move_to(seconds);
+    if (session && change == PlacedInstances::Change::Places) {
+      FARFIELD_TRY(session->move(instances.get()));
+    } else if (!session || change == PlacedInstances::Change::Instances) {
       session.reset();  // before the next one, so that two never share the budget
       FARFIELD_TRY_LET(auto opened,
                        RenderSession::open(device.get(), options_, asset_folders_, instances.get(), material_names_));
@@ -214,7 +224,8 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
     if (auto taken = sink(film.image(), metadata, report); !taken) return tl::unexpected(taken.error());
   }
   report.peak_rss_bytes = memory.peak_bytes();
-  if (const auto notice = budget_notice(report)) options_.warning(*notice);
+  for (const auto& notice : {budget_notice(report), morph_notice(report)})
+    if (notice) options_.warning(*notice);
   report.warnings = warnings_->lines();
   return report;
 }

@@ -31,6 +31,7 @@ struct RenderOptions {
   std::filesystem::path assets;
   float pixel_error = 1.0f;  ///< RuntimeOptions::pixel_error
   Blend blend = Blend::Dissolve;
+  float blend_window = 1.0f;          ///< RuntimeOptions::blend_window
   bool full_detail = false;           ///< level 0 only, from assets baked with --source-only
   std::filesystem::path environment;  ///< EXR or Radiance HDR; empty: sun and sky, see make_lights()
   bool sky = true;                    ///< false: without an environment there is no light but the scene's own
@@ -56,17 +57,22 @@ struct FrameReport {
   int frame = 0;
   double seconds = 0;            ///< wall time of plan, prefetch and render
   double cpu_seconds = 0;        ///< of all threads of the process meanwhile
-  double load_seconds = 0;       ///< summed over loads of levels: map, check, build
+  double load_seconds = 0;       ///< summed over loads of levels: read, check, build
   uint64_t accounted_bytes = 0;  ///< that the runtime counts against the budget, after the frame
   uint64_t rss_bytes = 0;        ///< of the process after the frame
   uint64_t levels_loaded = 0;
-  uint64_t fallbacks = 0;  ///< rays served by a coarser level than planned
+  uint64_t fallbacks = 0;  ///< visits of rays to instances that a coarser level than planned served
   uint64_t rays = 0;
   uint64_t invalid_samples = 0;        ///< paths whose value was not finite; black in the image
   double bias = 0;                     ///< PlanSummary::bias
   uint64_t asked_bytes = 0;            ///< a budget that would give nothing up
+  uint32_t morphs = 0;                 ///< PlanSummary::morphs
+  uint32_t morphs_given_up = 0;        ///< PlanSummary::morphs_given_up
   std::vector<uint32_t> finest_level;  ///< per asset of RenderReport::assets: finest level that rays may use
   std::vector<float> levels_given_up;  ///< per asset: how many levels coarser than asked, for the budget's sake
+
+  /// The picture is not what was planned: a level was lost or did not fit, which the warnings say.
+  bool is_degraded() const { return fallbacks > 0; }
 };
 
 struct RenderReport {
@@ -81,8 +87,12 @@ struct RenderReport {
 
 /// Renders one frame to `out` (EXR with the channels of film.h and metadata) and to the PNG beside it.
 /// frame: n is the scene at n / RenderOptions::frames_per_second, or GltfScene::frames_per_second where that is 0.
-/// Errors: those of the scene, the bake, the runtime, the files; Cancelled.
+/// Errors: those of the scene, the bake, the runtime, the files; those of check_frames (the picture is written all the
+/// same); Cancelled.
 Result<RenderReport> render_frame(const RenderOptions& options, int frame, const std::filesystem::path& out);
+
+/// Errors: BadFile, with their numbers, if any of the frames is degraded.
+Result<void> check_frames(const RenderReport& report);
 
 /// Writes an image to `exr` with its metadata, and as a PNG preview beside it. Errors: those of write_exr, write_png.
 Result<void> write_frame(const std::filesystem::path& exr, const Image& image, const Metadata& metadata,

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "path_tracer/render_session.h"
 
+#include <fmt/format.h>
 #include <malloc.h>
 
+#include <algorithm>
 #include <chrono>
 
+#include "base/bytes.h"
 #include "base/process_memory.h"
 #include "base/process_time.h"
 #include "base/result.h"
@@ -24,6 +27,7 @@ RuntimeOptions runtime_options(const RenderOptions& options, bool has_small_scen
   if (has_small_scene) runtime.scene_bytes_per_instance = kSmallSceneBytesPerInstance;
   runtime.budget_bytes = options.budget_bytes;
   runtime.blend = options.blend;
+  runtime.blend_window = options.blend_window;
   runtime.pixel_error = options.pixel_error;
   if (options.full_detail) runtime.forced_lambda = 0.0f;
   runtime.messages = [message = options.message, warning = options.warning](Severity severity,
@@ -32,6 +36,26 @@ RuntimeOptions runtime_options(const RenderOptions& options, bool has_small_scen
     if (sink) sink(text);
   };
   return runtime;
+}
+
+// The runtime knows what the assets and instances need that it was given so far; here all are known.
+Error with_number_for_all(const Error& error, const RenderOptions& options,
+                          std::span<const std::filesystem::path> folders, std::span<const GltfInstance> instances) {
+  if (error.code != ErrorCode::OutOfBudget) return error;
+  std::vector<std::string> shown;
+  for (const std::filesystem::path& folder : folders)
+    if (!folder.empty()) shown.push_back(folder.string());
+  const auto count = static_cast<uint64_t>(
+      std::ranges::count_if(instances, [&](const GltfInstance& instance) { return !folders[instance.mesh].empty(); }));
+  auto least = Runtime::least_budget(shown, count, runtime_options(options, true));
+  if (least && !needs_small_scene(instances.size(), *least))  // so much budget that the scene is not built small
+    least = Runtime::least_budget(shown, count, runtime_options(options, false));
+  if (!least) return error;
+  return {
+      ErrorCode::OutOfBudget,
+      fmt::format("the budget of {} is too small for {} assets and {} instances: raise it to {} ({} bytes) at least",
+                  format_bytes(options.budget_bytes), shown.size(), count, format_bytes(*least), *least),
+      error.warnings};
 }
 
 }  // namespace
@@ -44,23 +68,39 @@ Result<std::unique_ptr<RenderSession>> RenderSession::open(EmbreeDeviceRef devic
   const bool is_small = needs_small_scene(instances.size(), options.budget_bytes);
   FARFIELD_TRY_LET(auto runtime, Runtime::create(device, runtime_options(options, is_small)));
   session->runtime_ = std::move(runtime);
-  session->ids_ = SceneIds(names);
+  if (auto filled = session->fill(device, folders, instances, names, is_small); !filled)
+    return tl::unexpected(with_number_for_all(filled.error(), options, folders, instances));
+  return session;
+}
 
+Result<void> RenderSession::fill(EmbreeDeviceRef device, std::span<const std::filesystem::path> folders,
+                                 std::span<const GltfInstance> instances, const MaterialNames& names, bool is_small) {
+  ids_ = SceneIds(names);
   std::vector<AssetId> assets(folders.size());
   for (size_t mesh = 0; mesh < folders.size(); ++mesh) {
-    if (folders[mesh].empty()) continue;
-    FARFIELD_TRY_LET(const auto asset, session->runtime_->open_asset(folders[mesh].string()));
-    assets[mesh] = asset;
+    is_shown_.push_back(!folders[mesh].empty());
+    if (!is_shown_[mesh]) continue;
+    FARFIELD_TRY_LET(assets[mesh], runtime_->open_asset(folders[mesh].string()));
   }
   for (const GltfInstance& instance : instances) {
-    if (folders[instance.mesh].empty()) continue;
-    if (auto added = session->runtime_->add_instance(assets[instance.mesh], instance.to_world, instance.data); !added)
-      return tl::unexpected(added.error());
-    if (!names.empty()) session->ids_.add_instance(instance);
+    if (!is_shown_[instance.mesh]) continue;
+    FARFIELD_TRY(runtime_->add_instance(assets[instance.mesh], instance.to_world, instance.data));
+    if (!names.empty()) ids_.add_instance(instance);
   }
-  FARFIELD_TRY_LET(auto scene, make_scene(device, *session->runtime_, is_small));
-  session->scene_ = std::move(scene);
-  return session;
+  FARFIELD_TRY_LET(scene_, make_scene(device, *runtime_, is_small));
+  return {};
+}
+
+Result<void> RenderSession::move(std::span<const GltfInstance> instances) {
+  InstanceId id{0};
+  for (const GltfInstance& instance : instances) {
+    if (!is_shown_[instance.mesh]) continue;
+    FARFIELD_TRY(runtime_->move_instance(id, instance.to_world));
+    ++id.value;
+  }
+  FARFIELD_TRY(runtime_->attach(scene_.get()));
+  commit_scene(scene_.get());
+  return {};
 }
 
 Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& lights, const RenderOptions& options,
@@ -89,6 +129,8 @@ Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& li
   report.invalid_samples = traced.invalid_samples;
   report.bias = plan.bias;
   report.asked_bytes = plan.asked_bytes;
+  report.morphs = plan.morphs;
+  report.morphs_given_up = plan.morphs_given_up;
   report.finest_level = std::move(plan.finest_level);
   report.levels_given_up = std::move(plan.levels_given_up);
   return report;

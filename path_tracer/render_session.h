@@ -21,11 +21,15 @@ namespace farfield {
 class RenderSession {
  public:
   /// folders: per mesh, as find_or_bake_assets gives them; instances of meshes without one are left out.
-  /// names: for ids, of the same folders; empty without. The device outlives the session. Errors: those of Runtime.
+  /// names: for ids, of the same folders; empty without. The device outlives the session. Errors: those of Runtime;
+  /// OutOfBudget has the number that would do for the whole scene.
   static Result<std::unique_ptr<RenderSession>> open(EmbreeDeviceRef device, const RenderOptions& options,
                                                      std::span<const std::filesystem::path> folders,
                                                      std::span<const GltfInstance> instances,
                                                      const MaterialNames& names);
+
+  /// Places the instances anew: as many, of the same meshes in the same order. Errors: those of Runtime::move_instance.
+  Result<void> move(std::span<const GltfInstance> instances);
 
   /// Plans for the camera, loads, and renders into the film. The report's frame number is not
   /// set. Errors: those of plan_frame and path_trace.
@@ -36,7 +40,10 @@ class RenderSession {
 
  private:
   RenderSession() = default;
+  Result<void> fill(EmbreeDeviceRef device, std::span<const std::filesystem::path> folders,
+                    std::span<const GltfInstance> instances, const MaterialNames& names, bool is_small);
   std::unique_ptr<Runtime> runtime_;
+  std::vector<bool> is_shown_;  ///< per mesh: it has a folder
   SceneIds ids_;
   EmbreeScene scene_;
 };

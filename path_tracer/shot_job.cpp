@@ -7,9 +7,12 @@
 #include <charconv>
 #include <cmath>
 #include <functional>
+#include <optional>
+#include <set>
 #include <system_error>
 
 #include "base/file_io.h"
+#include "base/hash.h"
 #include "base/result.h"
 #include "path_tracer/frame_renderer.h"
 #include "path_tracer/image.h"
@@ -39,14 +42,17 @@ RenderReport keep_frames(RenderReport report, const std::function<bool(int frame
   return report.frames.empty() ? RenderReport() : report;
 }
 
-// What earlier runs of the same shot finished, whatever frames they were asked for. Empty if it was another shot.
-RenderReport finished_before(const fs::path& folder, const std::string& fingerprint) {
-  const auto record = read_shot_record(folder);
-  if (!record || record->fingerprint != fingerprint) return {};
-  return keep_frames(record->report, [&](int frame) {
+// What earlier runs of the same shot finished as planned, whatever frames they were asked for. Empty if it was another
+// shot.
+ShotRecord finished_before(const fs::path& folder, const std::string& fingerprint) {
+  auto record = read_shot_record(folder);
+  if (!record || record->fingerprint != fingerprint) return {fingerprint, {}, {}};
+  std::erase_if(record->report.frames, [](const FrameReport& frame) { return frame.is_degraded(); });
+  record->report = keep_frames(std::move(record->report), [&](int frame) {
     std::error_code ignored;
     return fs::exists(frame_path(folder, frame), ignored);
   });
+  return *record;
 }
 
 std::vector<int> frames_to_render(const FrameRange& frames, const RenderReport& finished) {
@@ -68,11 +74,42 @@ ContactSheet make_sheet(const FrameRange& frames, int width, int height) {
 
 int sheet_cell(const FrameRange& frames, int frame) { return (frame - frames.first) / frames.step; }
 
-// Puts a finished frame on the sheet. False if it is damaged.
-bool read_into_sheet(ContactSheet& sheet, int cell, const fs::path& frame) {
-  const auto file = read_exr(frame);
-  if (file) sheet.set(cell, file->image);
-  return file.has_value();
+// Reads a frame that the record calls finished. Errors: BadFile (damaged, or not what the shot has written).
+Result<Image> read_finished(const fs::path& frame, std::optional<uint64_t> hash) {
+  FARFIELD_TRY_LET(const uint64_t found, hash_file(frame));
+  if (hash && found != *hash)
+    return make_error(ErrorCode::BadFile, fmt::format("{}: it is not what this shot has written", frame.string()));
+  FARFIELD_TRY_LET(auto file, read_exr(frame));
+  return std::move(file.image);
+}
+
+// The preview beside a frame, where it is lost.
+Result<void> restore_preview(fs::path frame, const Image& image, float exposure_stops) {
+  std::error_code ignored;
+  if (fs::exists(frame.replace_extension(".png"), ignored)) return {};
+  return write_png(frame, image, {exposure_stops});
+}
+
+// Takes what earlier runs have finished of the range onto the sheet, and out of the record what has to be done again.
+Result<void> take_finished(ShotRecord& earlier, const FrameRange& frames, const fs::path& folder,
+                           const RenderOptions& options, ContactSheet& sheet) {
+  std::set<int> spoilt;
+  for (const FrameReport& report : earlier.report.frames) {
+    if (!in_range(frames, report.frame)) continue;
+    const fs::path path = frame_path(folder, report.frame);
+    const auto hash = earlier.exr_hashes.find(report.frame);
+    const auto image =
+        read_finished(path, hash == earlier.exr_hashes.end() ? std::nullopt : std::optional(hash->second));
+    if (image) {
+      FARFIELD_TRY(restore_preview(path, *image, options.exposure_stops));
+      sheet.set(sheet_cell(frames, report.frame), *image);
+    } else {
+      spoilt.insert(report.frame);
+      if (options.warning) options.warning(fmt::format("{}; it is rendered again", image.error().message));
+    }
+  }
+  earlier.report = keep_frames(std::move(earlier.report), [&](int frame) { return !spoilt.contains(frame); });
+  return {};
 }
 
 }  // namespace
@@ -111,37 +148,36 @@ Result<RenderReport> render_shot(const RenderOptions& options, const FrameRange&
   fs::create_directories(out, error);
   if (error) return make_error(ErrorCode::Io, fmt::format("cannot create {}: {}", out.string(), error.message()));
   FARFIELD_TRY_LET(const auto renderer, FrameRenderer::prepare(options));
-  const std::string& fingerprint = renderer->fingerprint();
 
   // The sheet and the frames of an earlier run are read before memory is measured.
   ContactSheet sheet = make_sheet(frames, options.width, options.height);
-  const RenderReport earlier = keep_frames(finished_before(out, fingerprint), [&](int frame) {
-    return !in_range(frames, frame) || read_into_sheet(sheet, sheet_cell(frames, frame), frame_path(out, frame));
-  });
-  const std::vector<int> missing = frames_to_render(frames, earlier);
+  ShotRecord earlier = finished_before(out, renderer->fingerprint());
+  FARFIELD_TRY(take_finished(earlier, frames, out, options, sheet));
+  const std::vector<int> missing = frames_to_render(frames, earlier.report);
   const int finished_count = frames.count() - static_cast<int>(missing.size());
   if (options.message && finished_count > 0)
     options.message(fmt::format("{} of {} frames are finished already", finished_count, frames.count()));
 
-  RenderReport report = earlier;
+  ShotRecord record = earlier;
   const auto take_frame = [&](const Image& image, const Metadata& metadata,
                               const RenderReport& so_far) -> Result<void> {
     const int frame = so_far.frames.back().frame;
-    FARFIELD_TRY(write_frame(frame_path(out, frame), image, metadata, options.exposure_stops));
+    const fs::path path = frame_path(out, frame);
+    FARFIELD_TRY(write_frame(path, image, metadata, options.exposure_stops));
+    FARFIELD_TRY_LET(record.exr_hashes[frame], hash_file(path));
     sheet.set(sheet_cell(frames, frame), image);
-    report = join_reports(earlier, so_far);
-    return write_record(out / "shot.json", {fingerprint, report});
+    record.report = join_reports(earlier.report, so_far);
+    return write_record(out / "shot.json", record);
   };
   if (!missing.empty()) {
     FARFIELD_TRY_LET(const auto rendered, renderer->render(missing, take_frame));
-    report = join_reports(earlier, rendered);
-    // Writing the last frame may have been the peak.
-    if (auto written = write_record(out / "shot.json", {fingerprint, report}); !written)
-      return tl::unexpected(written.error());
+    record.report = join_reports(earlier.report, rendered);
+    FARFIELD_TRY(write_record(out / "shot.json", record));  // writing the last frame may have been the peak
   }
-  if (auto written = write_png(out / "contact_sheet.png", sheet.image(), {options.exposure_stops}); !written)
-    return tl::unexpected(written.error());
-  return keep_frames(report, [&](int frame) { return in_range(frames, frame); });
+  FARFIELD_TRY(write_png(out / "contact_sheet.png", sheet.image(), {options.exposure_stops}));
+  RenderReport report = keep_frames(record.report, [&](int frame) { return in_range(frames, frame); });
+  FARFIELD_TRY(check_frames(report));
+  return report;
 }
 
 }  // namespace farfield

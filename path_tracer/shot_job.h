@@ -23,9 +23,10 @@ std::filesystem::path frame_path(const std::filesystem::path& folder, int frame)
 
 /// Renders the frames into folder `out` (created): frame_NNNN.exr and .png, shot.json rewritten whole after each frame,
 /// contact_sheet.png at the end. Frames that earlier runs with the same options finished, of whatever range, are kept
-/// and not rendered again unless their EXR is lost or damaged. shot.json tells of all of them, with the memory figures
-/// of the run that took most; the sheet and the report that is returned have the frames of this range only. On
-/// Cancelled what is finished stays, and shot.json tells of it.
+/// and not rendered again unless they are degraded, or their EXR is lost or another than was written; a lost PNG is
+/// made again. shot.json tells of all of them, with the memory figures of the run that took most; the sheet and the
+/// report that is returned have the frames of this range only. On Cancelled what is finished stays, and shot.json tells
+/// of it. Errors: those of render_frame; those of check_frames once all is written.
 Result<RenderReport> render_shot(const RenderOptions& options, const FrameRange& frames,
                                  const std::filesystem::path& out);
 

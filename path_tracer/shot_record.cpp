@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/file_io.h"
+#include "base/hash.h"
 #include "path_tracer/warning_log.h"
 
 namespace farfield {
@@ -31,9 +32,12 @@ Json frame_to_json(const FrameReport& frame, const std::vector<std::string>& ass
           {"rss_bytes", frame.rss_bytes},
           {"bias", frame.bias},
           {"asked_bytes", frame.asked_bytes},
+          {"morphs", frame.morphs},
+          {"morphs_given_up", frame.morphs_given_up},
           {"rays", frame.rays},
           {"levels_loaded", frame.levels_loaded},
           {"fallbacks", frame.fallbacks},
+          {"degraded", frame.is_degraded()},
           {"invalid_samples", frame.invalid_samples},
           {"finest_level", by_asset(assets, frame.finest_level)},
           {"levels_given_up", by_asset(assets, frame.levels_given_up)}};
@@ -49,6 +53,8 @@ FrameReport frame_from_json(const Json& json, const std::vector<std::string>& as
   json.at("rss_bytes").get_to(frame.rss_bytes);
   json.at("bias").get_to(frame.bias);
   json.at("asked_bytes").get_to(frame.asked_bytes);
+  frame.morphs = json.value("morphs", 0u);  // absent before there were any
+  frame.morphs_given_up = json.value("morphs_given_up", 0u);
   json.at("rays").get_to(frame.rays);
   json.at("levels_loaded").get_to(frame.levels_loaded);
   json.at("fallbacks").get_to(frame.fallbacks);
@@ -69,7 +75,11 @@ uint64_t beyond_baseline(const RenderReport& report) {
 std::string to_json(const ShotRecord& record) {
   const RenderReport& report = record.report;
   Json frames = Json::array();
-  for (const FrameReport& frame : report.frames) frames.push_back(frame_to_json(frame, report.assets));
+  for (const FrameReport& frame : report.frames) {
+    frames.push_back(frame_to_json(frame, report.assets));
+    if (const auto hash = record.exr_hashes.find(frame.frame); hash != record.exr_hashes.end())
+      frames.back()["exr_hash"] = to_hex(hash->second);
+  }
   const Json json = {{"budget_bytes", report.budget_bytes},
                      {"baseline_rss_bytes", report.baseline_rss_bytes},
                      {"peak_rss_bytes", report.peak_rss_bytes},
@@ -93,7 +103,11 @@ std::optional<ShotRecord> shot_record_from_json(const std::string& text) {
     json.at("fingerprint").get_to(record.fingerprint);
     json.at("assets").get_to(report.assets);
     report.warnings = json.value("warnings", std::vector<std::string>());  // absent before version 0.1
-    for (const Json& frame : json.at("frames")) report.frames.push_back(frame_from_json(frame, report.assets));
+    for (const Json& frame : json.at("frames")) {
+      report.frames.push_back(frame_from_json(frame, report.assets));
+      if (const auto hash = from_hex(frame.value("exr_hash", "")))
+        record.exr_hashes[report.frames.back().frame] = *hash;
+    }
     return record;
   } catch (const Json::exception&) {
     return std::nullopt;  // half a file, or somebody else's: the shot starts anew

@@ -2,7 +2,9 @@
 // shot.json: what a shot has done so far, for people, for checks, and for the run that goes on with it.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -14,12 +16,13 @@ namespace farfield {
 struct ShotRecord {
   std::string fingerprint;  ///< FrameRenderer::fingerprint() of the run that wrote it
   RenderReport report;
+  std::map<int, uint64_t> exr_hashes = {};  ///< per frame: XXH3 of its EXR as it was written; absent before version 0.1
 };
 
 /// {"budget_bytes", "baseline_rss_bytes", "peak_rss_bytes", "peak_accounted_bytes", "fingerprint", "assets": [...],
 /// "warnings": [...], "frames": [{"frame", "seconds", "cpu_seconds", "load_seconds", "accounted_bytes", "rss_bytes",
-/// "bias", "asked_bytes", "rays", "levels_loaded", "fallbacks", "invalid_samples", "finest_level": {asset: k},
-/// "levels_given_up": {asset: levels}}]}, indented, keys in this order, frames ascending.
+/// "bias", "asked_bytes", "rays", "levels_loaded", "fallbacks", "degraded", "invalid_samples", "finest_level": {asset:
+/// k}, "levels_given_up": {asset: levels}, "exr_hash"}]}, indented, keys in this order, frames ascending.
 std::string to_json(const ShotRecord& record);
 
 /// Reads what to_json wrote; nothing for any other text.

@@ -17,7 +17,7 @@ Result<RayScene> RayScene::build(const Surface& geometry) {
   const EmbreeGeometry triangles = new_triangles(device);
   copy_array<vec3>(triangles.get(), geometry.positions);  // it has no room behind the last one
   share_array<uvec3>(triangles.get(), geometry.triangles);
-  result.scene_ = build_static_scene(device, triangles.get());
+  result.scene_ = build_static_scene(device, triangles);
   FARFIELD_TRY(check_embree(device, fmt::format("build a BVH of {} triangles", geometry.triangles.size())));
   return result;
 }

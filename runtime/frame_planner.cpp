@@ -15,17 +15,41 @@ namespace {
 // A camera footprint's share of an image: no instance counts for more pixels than a frame has.
 constexpr double kLargestPixelCount = 1e7;
 
+bool are_same(const std::vector<TessellationCamera>& a, const std::vector<TessellationCamera>& b) {
+  return std::ranges::equal(a, b, [](const TessellationCamera& x, const TessellationCamera& y) {
+    return x.position == y.position && x.pixel_width == y.pixel_width && x.pixel_spread == y.pixel_spread;
+  });
+}
+
 }  // namespace
+
+void FramePlanner::note_moved(uint32_t instance) {
+  constexpr size_t kFewest = 1024, kLargestShare = 16;
+  if (instance >= up_to_date_) return;
+  moved_.push_back(instance);
+  if (moved_.size() < std::max(kFewest, up_to_date_ / kLargestShare)) return;
+  moved_ = {};  // as well all of them: the list takes memory
+  up_to_date_ = 0;
+}
+
+void FramePlanner::update_footprint(uint32_t i, const std::vector<TessellationCamera>& of_cameras) {
+  InstanceRecord& instance = geometry_.instances[i];
+  const bool is_seen = !of_cameras.empty() && !geometry_.is_hidden(i);
+  instance.footprint.camera_footprint =
+      is_seen ? finest_footprint(of_cameras, instance_bounds(instance, *geometry_.assets[instance.asset])) : 0.0f;
+}
 
 void FramePlanner::update_footprints(const std::vector<TessellationCamera>& of_cameras) {
   constexpr size_t kGrain = 1024;
-  parallel_for(geometry_.instances.size(), kGrain, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) {
-      InstanceRecord& instance = geometry_.instances[i];
-      const Box3 bounds = instance_bounds(instance, *geometry_.assets[instance.asset]);
-      instance.footprint.camera_footprint = of_cameras.empty() ? 0.0f : finest_footprint(of_cameras, bounds);
-    }
+  const size_t first = are_same(of_cameras, footprint_cameras_) ? up_to_date_ : 0;
+  const size_t count = geometry_.instances.size() - first;
+  parallel_for(count, kGrain, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) update_footprint(static_cast<uint32_t>(first + i), of_cameras);
   });
+  for (const uint32_t i : moved_) update_footprint(i, of_cameras);
+  footprint_cameras_ = of_cameras;
+  up_to_date_ = geometry_.instances.size();
+  moved_.clear();
 }
 
 /// The lambda that the cameras ask for on an instance, at least 0, not clamped to what there is.
@@ -42,7 +66,9 @@ std::vector<PlanAsset> FramePlanner::wanted_assets(const LevelStore& levels) con
     wanted.push_back(levels.plan_asset(i));
     if (options_.forced_lambda) wanted.back().ray_cost.clear();  // that very level, whatever it costs
   }
-  for (const InstanceRecord& instance : geometry_.instances) {
+  for (uint32_t i = 0; i < geometry_.instances.size(); ++i) {
+    if (geometry_.is_hidden(i)) continue;
+    const InstanceRecord& instance = geometry_.instances[i];
     PlanAsset& asset = wanted[instance.asset];
     // The longest side of the world, in pixels, squared.
     const double diagonal = glm::length(geometry_.assets[instance.asset]->bounds.size());
@@ -88,20 +114,30 @@ Result<PlanSummary> FramePlanner::plan(LevelStore& levels) {
   summary.bias = plan->bias;
   summary.levels_given_up = plan->levels_given_up;
   summary.asked_bytes = plan->asked_bytes;
+  for (const std::vector<uint8_t>& slots : plan->morphs) summary.morphs += static_cast<uint32_t>(slots.size());
+  summary.morphs_given_up = plan->morphs_given_up;
   return summary;
 }
 
 void FramePlanner::prefetch(LevelStore& levels) const {
   std::vector<std::vector<bool>> is_needed(levels.asset_count());
   for (uint32_t i = 0; i < levels.asset_count(); ++i) is_needed[i].resize(levels.asset(i).traced.slot_count());
-  for (const InstanceRecord& instance : geometry_.instances) {
+  auto is_morph_needed = is_needed;
+  for (uint32_t i = 0; i < geometry_.instances.size(); ++i) {
+    if (geometry_.is_hidden(i)) continue;
+    const InstanceRecord& instance = geometry_.instances[i];
     const SlotBlend slots = split_slots(*geometry_.assets[instance.asset], wanted_lambda(instance));
     is_needed[instance.asset][slots.slot] = true;
-    if (slots.blend > 0.0f) is_needed[instance.asset][slots.coarser] = true;
+    if (!(slots.blend > 0.0f)) continue;
+    is_needed[instance.asset][slots.coarser] = true;
+    is_morph_needed[instance.asset][slots.slot] = geometry_.assets[instance.asset]->may_morph(slots.slot);
   }
   for (uint32_t i = 0; i < levels.asset_count(); ++i) {
     for (size_t slot = is_needed[i].size(); slot-- > 0;) {  // coarse ones first: they are what others fall back to
       if (is_needed[i][slot]) levels.load(i, static_cast<uint32_t>(slot));
+    }
+    for (size_t slot = 0; slot < is_morph_needed[i].size(); ++slot) {
+      if (is_morph_needed[i][slot]) levels.load_morph(i, static_cast<uint32_t>(slot));
     }
   }
 }

@@ -20,6 +20,9 @@ class FramePlanner {
   /// Of the coming plan.
   void set_cameras(std::vector<TessellationCamera> cameras) { cameras_ = std::move(cameras); }
 
+  /// An instance that there was at the last plan stands elsewhere now. New ones need not be named.
+  void note_moved(uint32_t instance);
+
   /// Plans for the cameras and puts the plan in force. After an error the former plan and its footprints stay.
   /// Errors: OutOfBudget, InvalidArgument (no camera).
   Result<PlanSummary> plan(LevelStore& levels);
@@ -33,6 +36,7 @@ class FramePlanner {
   };
   Result<TexturedPlan> plan_with_textures(LevelStore& levels) const;
   void update_footprints(const std::vector<TessellationCamera>& of_cameras);
+  void update_footprint(uint32_t instance, const std::vector<TessellationCamera>& of_cameras);
   float wanted_lambda(const InstanceRecord& instance) const;
   std::vector<PlanAsset> wanted_assets(const LevelStore& levels) const;
 
@@ -40,6 +44,11 @@ class FramePlanner {
   InstanceGeometry& geometry_;
   std::vector<TessellationCamera> cameras_;
   std::vector<TessellationCamera> planned_cameras_;  ///< those of the plan in force
+
+  // What of the instances' footprints is right: they are of footprint_cameras_, but for moved_ and from up_to_date_ on.
+  std::vector<TessellationCamera> footprint_cameras_;
+  size_t up_to_date_ = 0;
+  std::vector<uint32_t> moved_;
 };
 
 }  // namespace farfield

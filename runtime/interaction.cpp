@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
+#include <optional>
 #include <type_traits>
 #include <utility>
 
@@ -95,6 +96,20 @@ MainNormal main_normal(const SymMat3& s, const vec3& start) {
   }
   const float aside = 0.5f * std::clamp(1 - s.quadratic(normal) / trace, 0.0f, 2.0f / 3);
   return {normal, roughness2_of_spread(aside)};
+}
+
+void set_sggx(Reflectance& reflectance, const SymMat3& s) {
+  const float entries[] = {s.xx, s.yy, s.zz, s.xy, s.xz, s.yz};
+  std::ranges::copy(entries, reflectance.sggx);
+}
+
+/// What faces and flakes have in common.
+template <typename Params>
+void set_reflectance(Reflectance& reflectance, const Params& params) {
+  reflectance.diffuse = params.diffuse;
+  reflectance.specular = params.specular;
+  reflectance.transmission = params.transmission;
+  reflectance.roughness = std::sqrt(std::sqrt(params.roughness2));
 }
 
 /// On wo's side of the surface, and not beyond its own horizon.
@@ -185,21 +200,56 @@ vec3 look_closely(const TracedLevel& level, const SurfacePoint& point, const Ins
   return source.normal == vec3(0.0f) ? normal : glm::normalize(instance.normal_to_world(source.normal));
 }
 
+/// The distribution of a face's normals in world space, trace 1; none: its own alone.
+std::optional<SymMat3> face_normals(const LevelView& view, uint32_t face, const InstanceRecord& instance) {
+  if (view.face_sggx.empty()) return std::nullopt;
+  return to_world(unpack(view.face_sggx[face]), ScaledInverse(instance));
+}
+
+template <typename T>
+T blended(const T& a, const T& b, float t) {
+  return a * (1 - t) + b * t;
+}
+
+SurfaceParams blended(const SurfaceParams& a, const SurfaceParams& b, float t) {
+  SurfaceParams mixed;
+  mixed.diffuse = blended(a.diffuse, b.diffuse, t);
+  mixed.specular = blended(a.specular, b.specular, t);
+  mixed.transmission = blended(a.transmission, b.transmission, t);
+  mixed.roughness2 = blended(a.roughness2, b.roughness2, t);
+  return mixed;
+}
+
 /// How the surface reflects at a hit, with its geometric normal known; sets the shading normal and what it emits.
-SurfaceParams shade_surface(const TracedLevel& level, const InstanceRecord& instance, const HitRecord& hit,
+SurfaceParams shade_surface(const HitLevels& levels, const InstanceRecord& instance, const HitRecord& hit,
                             const vec3& world_direction, Interaction& interaction) {
+  const TracedLevel& level = *levels.level;
   const LevelView& view = level.view;
   const uint32_t quad = hit.element / 2, face = level.face_of(quad, hit.element % 2);
   SurfaceParams params = face_params(view, face);
   interaction.emission = emission_at(view.face_emission, face);
   vec3 normal = interaction.geometric_normal;
+  std::optional<SymMat3> normals = face_normals(view, face, instance);
   if (level.look) {
     const vec3 local = instance.vector_to_local(world_direction);
     const float width = hit.footprint * glm::length(local) / glm::length(world_direction);
     const vec2 barycentric(hit.barycentric[0], hit.barycentric[1]);
     normal = look_closely(level, {quad, face, barycentric, local, width}, instance, normal, interaction, params);
-  } else if (!view.face_sggx.empty()) {
-    const MainNormal main = main_normal(to_world(unpack(view.face_sggx[face]), ScaledInverse(instance)), normal);
+  }
+  if (levels.morph && !hit.is_coarser) {
+    const uint32_t target = levels.morph->coarse_face(face);
+    const TracedLevel& coarse = levels.morph->coarse();
+    if (target < coarse.face_count) {
+      const auto of_target = face_normals(coarse.view, target, instance);
+      normals = blended(normals.value_or(SymMat3::outer(normal)),
+                        of_target.value_or(SymMat3::outer(interaction.geometric_normal)), hit.blend);
+      params = blended(params, face_params(coarse.view, target), hit.blend);
+      interaction.emission = blended(interaction.emission, emission_at(coarse.view.face_emission, target), hit.blend);
+    }
+  }
+  if (normals) {
+    set_sggx(interaction.reflectance, *normals);
+    const MainNormal main = main_normal(*normals, normal);
     normal = main.normal;
     params.roughness2 = std::min(params.roughness2 + main.roughness2, 1.0f);
   }
@@ -214,9 +264,9 @@ bool is_on_one_side(const Interaction& interaction, const vec3& wi) {
 
 }  // namespace
 
-Interaction make_interaction(const TracedLevel& level, const InstanceRecord& instance, const RTCRayHit& ray_hit,
+Interaction make_interaction(const HitLevels& levels, const InstanceRecord& instance, const RTCRayHit& ray_hit,
                              const HitRecord& hit) {
-  const LevelView& view = level.view;
+  const LevelView& view = levels.level->view;
   const RTCRay& ray = ray_hit.ray;
   const vec3 origin(ray.org_x, ray.org_y, ray.org_z);
   const vec3 direction(ray.dir_x, ray.dir_y, ray.dir_z);
@@ -234,17 +284,20 @@ Interaction make_interaction(const TracedLevel& level, const InstanceRecord& ins
     interaction.kind = Interaction::Kind::Volume;
     const FogParams params = fog_params(view, instance, hit.element);
     interaction.albedo = cluster_albedo(params.albedo, params.self_shadowing);
-    interaction.anisotropy = params.anisotropy;
-    interaction.self_shadowing = params.self_shadowing;
+    interaction.reflectance.fog = params.albedo;
+    interaction.reflectance.anisotropy = params.anisotropy;
+    interaction.reflectance.self_shadowing = params.self_shadowing;
     InteractionModel::put(interaction, InteractionModel(FogPhase(params, interaction.wo)));
     return interaction;
   }
   if (hit.is_volume) {
     interaction.kind = Interaction::Kind::Volume;
     const FlakeParams params = flake_params(view, instance, hit.element);
+    set_reflectance(interaction.reflectance, params);
+    set_sggx(interaction.reflectance, params.sggx);
+    interaction.reflectance.self_shadowing = params.self_shadowing;
     interaction.albedo = layered_albedo(params.specular, params.diffuse + params.transmission);
     interaction.emission = emission_at(view.voxel_emission, hit.element);
-    interaction.self_shadowing = params.self_shadowing;
     InteractionModel::put(interaction, InteractionModel(FlakePhase(params, interaction.wo)));
     return interaction;
   }
@@ -252,7 +305,8 @@ Interaction make_interaction(const TracedLevel& level, const InstanceRecord& ins
   const vec3 normal_local(hit.normal_local[0], hit.normal_local[1], hit.normal_local[2]);
   const vec3 normal = glm::normalize(instance.normal_to_world(glm::normalize(normal_local)));
   interaction.geometric_normal = glm::dot(normal, interaction.wo) < 0.0f ? -normal : normal;
-  const SurfaceParams params = shade_surface(level, instance, hit, direction, interaction);
+  const SurfaceParams params = shade_surface(levels, instance, hit, direction, interaction);
+  set_reflectance(interaction.reflectance, params);
   interaction.albedo = layered_albedo(params.specular, params.diffuse + params.transmission);
   InteractionModel::put(interaction,
                         InteractionModel(SurfaceBsdf(params, interaction.shading_normal, interaction.wo),

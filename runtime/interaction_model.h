@@ -4,6 +4,7 @@
 
 #include "bvh/instance_geometry.h"
 #include "bvh/traced_asset.h"
+#include "bvh/traced_morph.h"
 #include "farfield/interaction.h"
 #include "scattering/flake_phase.h"
 #include "scattering/fog_phase.h"
@@ -12,12 +13,18 @@
 
 namespace farfield {
 
+/// What a hit is on.
+struct HitLevels {
+  const TracedLevel* level = nullptr;  ///< the one whose element was hit
+  const TracedMorph* morph = nullptr;  ///< of which it is one of the two; null: the level alone
+};
+
 /// Whether the level has what the record says was hit.
 bool is_hit_of(const TracedLevel& level, const HitRecord& hit);
 
-/// Rebuilds the interaction of a hit on `level` of `instance`; is_hit_of(level, hit). ray_hit: as rtcIntersect1 left
-/// it. Pure.
-Interaction make_interaction(const TracedLevel& level, const InstanceRecord& instance, const RTCRayHit& ray_hit,
+/// Rebuilds the interaction of a hit on a level (not null) of `instance`; is_hit_of(level, hit). ray_hit: as
+/// rtcIntersect1 left it. Pure.
+Interaction make_interaction(const HitLevels& levels, const InstanceRecord& instance, const RTCRayHit& ray_hit,
                              const HitRecord& hit);
 
 namespace detail {

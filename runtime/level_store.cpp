@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <malloc.h>
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace farfield {
@@ -21,6 +23,8 @@ constexpr uint64_t kTrimShare = 64;
 LevelStore::LevelStore(std::unique_ptr<BvhDevice> device, const RuntimeOptions& options, Messages& messages)
     : budget_bytes_(options.budget_bytes),
       residency_(options.residency),
+      blend_(options.blend),
+      blend_window_(options.blend_window),
       messages_(messages),
       textures_(messages),
       device_(std::move(device)),
@@ -29,23 +33,46 @@ LevelStore::LevelStore(std::unique_ptr<BvhDevice> device, const RuntimeOptions& 
 
 const TracedLevel* LevelStore::serve(uint32_t asset_index, uint32_t slot) {
   OpenAsset& asset = *assets_[asset_index];
-  const bool wait = residency_ == Residency::Wait;
-  bool was_requested = false;
+  bool may_ask = true;
   for (uint32_t served = slot; served < asset.traced.slot_count(); ++served) {
-    const size_t item = asset.items[served];
-    const Resident* resident = wait ? levels_.acquire(item) : levels_.try_acquire(item);
-    if (resident) {
-      const TracedLevel* level = static_cast<const LoadedLevel*>(resident)->traced.get();
-      asset.traced.loaded[served].store(level, std::memory_order_release);
+    if (const TracedLevel* level = find_level(asset, served, may_ask)) {
       if (served != slot) fallbacks_.fetch_add(1, std::memory_order_relaxed);
       return level;
     }
-    if (!wait && !was_requested && levels_.state(item) == ItemState::Empty) {
-      loader_.request(item);
-      was_requested = true;
-    }
   }
   return nullptr;
+}
+
+const TracedMorph* LevelStore::serve_morph(uint32_t asset_index, uint32_t slot) {
+  OpenAsset& asset = *assets_[asset_index];
+  bool may_ask = true;
+  const bool has_levels = find_level(asset, slot + 1, may_ask) && find_level(asset, slot, may_ask);
+  const Resident* resident = has_levels ? find(asset.morph_items[slot], may_ask) : nullptr;
+  if (!resident) {
+    fallbacks_.fetch_add(1, std::memory_order_relaxed);
+    return nullptr;
+  }
+  const TracedMorph* morph = static_cast<const LoadedMorph*>(resident)->traced.get();
+  asset.traced.morphs[slot].store(morph, std::memory_order_release);
+  return morph;
+}
+
+const TracedLevel* LevelStore::find_level(OpenAsset& asset, uint32_t slot, bool& may_ask) {
+  const Resident* resident = find(asset.items[slot], may_ask);
+  if (!resident) return nullptr;
+  const TracedLevel* level = static_cast<const LoadedLevel*>(resident)->traced.get();
+  asset.traced.loaded[slot].store(level, std::memory_order_release);
+  return level;
+}
+
+const Resident* LevelStore::find(size_t item, bool& may_ask) {
+  if (residency_ == Residency::Wait) return levels_.acquire(item);
+  const Resident* resident = levels_.try_acquire(item);
+  if (!resident && may_ask && levels_.state(item) == ItemState::Empty) {
+    loader_.request(item);
+    may_ask = false;
+  }
+  return resident;
 }
 
 Result<uint32_t> LevelStore::open(const std::filesystem::path& folder, MaterialFunction materials) {
@@ -58,27 +85,50 @@ Result<uint32_t> LevelStore::open(const std::filesystem::path& folder, MaterialF
     refused_.push_back(std::move(asset));
     return tl::unexpected(root.error());
   }
+  asset->traced.blend_window = blend_window_;
+  asset->traced.finest_blended = std::exp2(-blend_window_);
   asset->traced.usable_slots = {static_cast<uint8_t>(asset->traced.slot_count() - 1)};  // until a plan says otherwise
+  table_bytes_ += asset->table_bytes();
   assets_.push_back(std::move(asset));
   levels_.set_other_bytes(fixed_bytes() + texture_bytes_);
   return static_cast<uint32_t>(assets_.size() - 1);
 }
 
-Result<void> LevelStore::load_root(OpenAsset& asset) {
-  for (uint32_t slot = 0; slot < asset.traced.slot_count(); ++slot) {
-    ResidencyItem item = make_level_item(asset, slot, *device_);
-    item.load = [this, load = std::move(item.load)] {
-      Result<LoadedItem> loaded = load();
-      if (loaded) count_freed(loaded->build_peak_bytes);
-      return loaded;
-    };
-    asset.items.push_back(levels_.add(std::move(item)));
-    item_owners_.push_back({&asset, slot});
+void LevelStore::add_item(OpenAsset& asset, uint32_t slot, bool is_morph, std::vector<size_t>& numbers) {
+  ResidencyItem item = is_morph ? make_morph_item(asset, slot, *device_) : make_level_item(asset, slot, *device_);
+  item.load = [this, load = std::move(item.load)](uint64_t bytes_left) {
+    Result<LoadedItem> loaded = load(bytes_left);
+    if (loaded) count_freed(loaded->build_peak_bytes);
+    return loaded;
+  };
+  numbers.push_back(levels_.add(std::move(item)));
+  item_owners_.push_back({&asset, slot, is_morph});
+}
+
+void LevelStore::add_items(OpenAsset& asset) {
+  const uint32_t count = asset.traced.slot_count();
+  for (uint32_t slot = 0; slot < count; ++slot) add_item(asset, slot, false, asset.items);
+  if (blend_ == Blend::Morph) {
+    for (uint32_t slot = 0; slot < count; ++slot) {
+      if (asset.morph_costs[slot]) {
+        add_item(asset, slot, true, asset.morph_items);
+      } else {
+        asset.morph_items.push_back(kNoItem);
+      }
+    }
+    if (std::ranges::count(asset.morph_items, kNoItem) > 1) {  // the root has none
+      messages_.report(
+          Severity::Warning,
+          fmt::format("{}: its levels dissolve: it was baked before morphs were measured; bake it again", asset.name));
+    }
   }
   loader_.resize(levels_.size());
+}
 
+Result<void> LevelStore::load_root(OpenAsset& asset) {
+  add_items(asset);
   // Roots come first: what an earlier plan has loaded beside them may be in the way, and the next plan decides anew.
-  FARFIELD_TRY_LET(const auto plan, plan_roots(asset));
+  FARFIELD_TRY_LET(const auto plan, plan_roots(&asset));
   const size_t root = asset.items.back();
   const uint64_t needed = levels_.resident_bytes(root) + levels_.build_peak_bytes(root) + asset.table_bytes();
   if (levels_.stats().accounted_bytes + needed > budget_bytes_) apply(plan, 0);
@@ -91,14 +141,39 @@ Result<void> LevelStore::load_root(OpenAsset& asset) {
   return {};
 }
 
-/// The plan in which all assets have nothing but their roots.
-Result<Plan> LevelStore::plan_roots(const OpenAsset& newcomer) const {
+/// The plan in which all assets, and the one that is being opened, have nothing but their roots.
+Result<Plan> LevelStore::plan_roots(const OpenAsset* newcomer) const {
   std::vector<PlanAsset> wanted;
   for (const auto& asset : assets_) wanted.push_back(plan_asset(*asset));
-  wanted.push_back(plan_asset(newcomer));
-  auto plan = plan_levels(wanted, budget_bytes_, fixed_bytes() + newcomer.table_bytes());
-  if (plan) plan->usable.pop_back();  // apply() knows the newcomer not yet
+  if (newcomer) wanted.push_back(plan_asset(*newcomer));
+  auto plan = plan_levels(wanted, budget_bytes_, fixed_bytes() + (newcomer ? newcomer->table_bytes() : 0));
+  if (plan && newcomer) plan->usable.pop_back();  // apply() knows it not yet
   return plan;
+}
+
+Result<void> LevelStore::set_instance_bytes(uint64_t bytes) {
+  if (levels_.stats().accounted_bytes - instance_bytes_ + bytes > budget_bytes_) {
+    const uint64_t former = std::exchange(instance_bytes_, bytes);
+    const Result<Plan> roots = plan_roots(nullptr);
+    instance_bytes_ = former;
+    if (!roots) return tl::unexpected(roots.error());
+    apply(*roots, 0);
+  }
+  instance_bytes_ = bytes;
+  levels_.set_other_bytes(fixed_bytes() + texture_bytes_);
+  return {};
+}
+
+Result<uint64_t> LevelStore::least_bytes(std::span<const std::filesystem::path> folders, uint64_t instance_bytes) {
+  Messages silent({});
+  TextureCache textures(silent);
+  uint64_t bytes = kRuntimeBytes + instance_bytes, largest_peak = 0;
+  for (const std::filesystem::path& folder : folders) {
+    FARFIELD_TRY_LET(const auto asset, read_asset(folder, {}, textures));
+    bytes += asset->table_bytes() + asset->levels.back().resident_bytes;
+    largest_peak = std::max(largest_peak, asset->build_peak_bytes.back());
+  }
+  return bytes + largest_peak;
 }
 
 PlanAsset LevelStore::plan_asset(const OpenAsset& asset) const {
@@ -107,6 +182,12 @@ PlanAsset LevelStore::plan_asset(const OpenAsset& asset) const {
     const bool is_lost = levels_.state(item) == ItemState::Broken;  // a coarser one serves: it takes nothing
     wanted.resident_bytes.push_back(is_lost ? 0 : levels_.resident_bytes(item));
     wanted.build_peak_bytes.push_back(is_lost ? 0 : levels_.build_peak_bytes(item));
+  }
+  for (const size_t item : asset.morph_items) {
+    const bool is_there = item != kNoItem && levels_.state(item) != ItemState::Broken;
+    wanted.morphs.push_back(
+        is_there ? std::optional<MorphSize>({levels_.resident_bytes(item), levels_.build_peak_bytes(item)})
+                 : std::nullopt);
   }
   wanted.lambda = asset.traced.level_numbers;
   wanted.ray_cost = asset.ray_cost;
@@ -134,11 +215,17 @@ void LevelStore::apply(const Plan& plan, uint64_t texture_bytes) {
   for (size_t i = 0; i < plan.usable.size(); ++i) {
     OpenAsset& asset = *assets_[i];
     asset.traced.usable_slots = plan.usable[i];
-    for (uint32_t slot = 0; slot < asset.traced.slot_count(); ++slot) {
-      const bool is_refused = levels_.state(asset.items[slot]) == ItemState::Refused;  // this plan may have room for it
-      if (!asset.traced.is_usable(slot) || is_refused) {
-        asset.traced.loaded[slot].store(nullptr, std::memory_order_relaxed);  // no ray in flight
+    asset.traced.morphing_slots = plan.morphs[i];
+    const auto is_refused = [&](size_t item) { return levels_.state(item) == ItemState::Refused; };
+    for (uint32_t slot = 0; slot < asset.traced.slot_count(); ++slot) {      // no ray in flight
+      if (!asset.traced.is_usable(slot) || is_refused(asset.items[slot])) {  // this plan may have room for it
+        asset.traced.loaded[slot].store(nullptr, std::memory_order_relaxed);
         dropped.push_back(asset.items[slot]);
+      }
+      if (asset.morph_items.empty() || asset.morph_items[slot] == kNoItem) continue;
+      if (!asset.traced.may_morph(slot) || is_refused(asset.morph_items[slot])) {
+        asset.traced.morphs[slot].store(nullptr, std::memory_order_relaxed);
+        dropped.push_back(asset.morph_items[slot]);
       }
     }
   }
@@ -159,11 +246,9 @@ void LevelStore::load(uint32_t asset, uint32_t slot) {
   }
 }
 
-uint64_t LevelStore::fixed_bytes() const {
-  uint64_t bytes = kRuntimeBytes + instance_bytes_;
-  for (const auto& asset : assets_) bytes += asset->table_bytes();
-  return bytes;
-}
+void LevelStore::load_morph(uint32_t asset, uint32_t slot) { serve_morph(asset, slot); }
+
+uint64_t LevelStore::fixed_bytes() const { return kRuntimeBytes + instance_bytes_ + table_bytes_; }
 
 /// Builds and releases leave holes in the heap, which `ps` still counts.
 void LevelStore::count_freed(uint64_t bytes) {
@@ -179,9 +264,12 @@ void LevelStore::report_broken(size_t item, const Error& error) {
     opening_error_ = error;  // open_asset() returns it
     return;
   }
-  messages_.report(error.code == ErrorCode::OutOfBudget ? Severity::Warning : Severity::Error,
-                   fmt::format("{}: level {} is left out, a coarser one serves in its place: {}", owner.asset->name,
-                               owner.asset->levels[owner.slot].level, error.message));
+  const uint32_t level = owner.asset->levels[owner.slot].level;
+  messages_.report(
+      error.code == ErrorCode::OutOfBudget ? Severity::Warning : Severity::Error,
+      owner.is_morph ? fmt::format("{}: level {} dissolves into the next: {}", owner.asset->name, level, error.message)
+                     : fmt::format("{}: level {} is left out, a coarser one serves in its place: {}", owner.asset->name,
+                                   level, error.message));
 }
 
 }  // namespace farfield

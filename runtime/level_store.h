@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/result.h"
@@ -29,6 +30,7 @@ class LevelStore final : public LevelSource {
 
   // Rays
   const TracedLevel* serve(uint32_t asset, uint32_t slot) override;
+  const TracedMorph* serve_morph(uint32_t asset, uint32_t slot) override;
 
   // Between frames
   /// The asset in a (canonical) folder, opened with its root if it is not yet. Errors: those of Runtime::open_asset.
@@ -36,10 +38,13 @@ class LevelStore final : public LevelSource {
   size_t asset_count() const { return assets_.size(); }
   const OpenAsset& asset(uint32_t i) const { return *assets_[i]; }
 
-  /// What all instances take, here and in the host's scene.
-  void set_instance_bytes(uint64_t bytes) { instance_bytes_ = bytes; }
+  /// What all instances take, here and in the host's scene. Where that has no room beside what is loaded, all but the
+  /// roots is given back. Errors: OutOfBudget (the former number stays).
+  Result<void> set_instance_bytes(uint64_t bytes);
   /// What the budget pays for besides levels and textures.
   uint64_t fixed_bytes() const;
+  /// A budget for these (canonical) folders and instances that take so many bytes. Errors: those of read_asset.
+  static Result<uint64_t> least_bytes(std::span<const std::filesystem::path> folders, uint64_t instance_bytes);
 
   /// What the cache of textures wants if the plan shows textured sources up close; 0 if it does not.
   uint64_t wanted_texture_bytes(const Plan& plan) const;
@@ -54,6 +59,8 @@ class LevelStore final : public LevelSource {
   void apply(const Plan& plan, uint64_t texture_bytes);
   /// Loads a level that the plan allows; in progressive mode only asks for it.
   void load(uint32_t asset, uint32_t slot);
+  /// The same for its morph to the next, whose levels were loaded before.
+  void load_morph(uint32_t asset, uint32_t slot);
 
   ResidencyStats stats() const { return levels_.stats(); }
   uint64_t fallbacks() const { return fallbacks_.load(std::memory_order_relaxed); }
@@ -62,20 +69,29 @@ class LevelStore final : public LevelSource {
   struct ItemOwner {
     OpenAsset* asset;
     uint32_t slot;
+    bool is_morph;
   };
 
   PlanAsset plan_asset(const OpenAsset& asset) const;
+  void add_items(OpenAsset& asset);
+  void add_item(OpenAsset& asset, uint32_t slot, bool is_morph, std::vector<size_t>& numbers);
   Result<void> load_root(OpenAsset& asset);
-  Result<Plan> plan_roots(const OpenAsset& newcomer) const;
+  const TracedLevel* find_level(OpenAsset& asset, uint32_t slot, bool& may_ask);
+  /// An item that is there, or that may be waited for; else it is asked for, if may_ask, which is false from then on.
+  const Resident* find(size_t item, bool& may_ask);
+  Result<Plan> plan_roots(const OpenAsset* newcomer) const;
   void count_freed(uint64_t bytes);
   void report_broken(size_t item, const Error& error);
 
   const uint64_t budget_bytes_;
   const Residency residency_;
+  const Blend blend_;
+  const float blend_window_;
   Messages& messages_;
   TextureCache textures_;
   uint64_t texture_bytes_ = 0;  ///< that the plan in force gives textures_
   uint64_t instance_bytes_ = 0;
+  uint64_t table_bytes_ = 0;  ///< of assets_
   std::unique_ptr<BvhDevice> device_;
   std::vector<std::unique_ptr<OpenAsset>> assets_;
   std::vector<std::unique_ptr<OpenAsset>> refused_;  ///< did not open; items of levels_ refer to them

@@ -3,10 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <system_error>
 
+#include "base/bytes.h"
 #include "base/result.h"
+#include "cache/hull_check.h"
 #include "cache/level_file.h"
 #include "cache/manifest.h"
 
@@ -42,9 +45,10 @@ Result<void> check_planned_bytes(const LevelEntry& entry, const std::filesystem:
                                 (folder / kManifestName).string(), entry.level, entry.file_bytes));
 }
 
-/// A level's file must be the one that the manifest means, since plans and rays go by the manifest.
-Result<void> check_header(const LevelHeader& header, const OpenAsset& asset, uint32_t slot,
-                          const std::filesystem::path& path) {
+/// A level's file must be what the manifest says, since plans and rays go by the manifest.
+Result<void> check_level(const LevelView& level, const OpenAsset& asset, uint32_t slot,
+                         const std::filesystem::path& path) {
+  const LevelHeader& header = level.header;
   const LevelInfo& info = asset.levels[slot];
   const auto refuse = [&](const std::string& what) {
     return make_error(ErrorCode::BadFile,
@@ -56,37 +60,71 @@ Result<void> check_header(const LevelHeader& header, const OpenAsset& asset, uin
   if (!(std::abs(header.resolution - info.resolution) <= 1e-5f * info.resolution)) {
     return refuse(fmt::format("its resolution is {}, the manifest says {}", header.resolution, info.resolution));
   }
-  const Box3 allowed = padded_bounds(asset.traced.bounds);
   if (header.bounds.is_empty()) return {};
+  const Box3 allowed = padded_bounds(asset.traced.bounds);
   for (int axis = 0; axis < 3; ++axis) {
     if (!(header.bounds.lower[axis] >= allowed.lower[axis] && header.bounds.upper[axis] <= allowed.upper[axis])) {
       return refuse("it sticks out of the bounds that the manifest gives");
     }
   }
+  if (reach_out_of_hull(level, asset.traced.hull) > hull_slack(asset.traced.bounds)) {
+    return refuse("it sticks out of the hull that the manifest gives");
+  }
   return {};
 }
 
 Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::filesystem::path& path,
-                              BvhDevice& device) {
+                              BvhDevice& device, uint64_t bytes_left) {
   auto loaded = std::make_unique<LoadedLevel>();
-  FARFIELD_TRY_LET(loaded->file, LevelFile::open_known(path, asset.file_hashes[slot]));
+  FARFIELD_TRY_LET(loaded->file, LevelFile::open_known(path, asset.levels[slot].file_bytes, asset.file_hashes[slot]));
   const LevelView& view = loaded->file->view();
-  FARFIELD_TRY(check_header(view.header, asset, slot, path));
+  FARFIELD_TRY(check_level(view, asset, slot, path));
   const SurfaceLook* look = view.header.level == 0 ? asset.close_up.get() : nullptr;
-  FARFIELD_TRY_LET(auto traced, TracedLevel::build(device, view, slot, look));
-  loaded->traced = std::move(traced);
+  const uint64_t file_bytes = level_file_sizes(view).memory_bytes;  // at most bytes_left, by check_planned_bytes()
+  auto traced = TracedLevel::build(device, view, slot, look, bytes_left - std::min(bytes_left, file_bytes));
+  if (!traced) {
+    return make_error(
+        traced.error().code,
+        fmt::format("{}: {}; its manifest says {} with all else: raise the budget, or see `farfield verify`",
+                    path.string(), traced.error().message,
+                    format_bytes(asset.levels[slot].resident_bytes + asset.build_peak_bytes[slot])));
+  }
+  loaded->traced = std::move(*traced);
   loaded->file->release_build_pages();
   const LevelCost cost = level_cost(view, loaded->traced->scene);
+  return LoadedItem{std::move(loaded), cost.resident_bytes, cost.build_peak_bytes};
+}
+
+Result<LoadedItem> load_morph(const OpenAsset& asset, uint32_t slot, BvhDevice& device, uint64_t bytes_left) {
+  const uint64_t file_bytes = asset.levels[slot].file_bytes + asset.levels[slot + 1].file_bytes;
+  if (file_bytes > bytes_left) {
+    return make_error(ErrorCode::OutOfBudget,
+                      fmt::format("its morph to the next level takes more than {}, its manifest says {}; see `farfield "
+                                  "verify`",
+                                  format_bytes(bytes_left), format_bytes(asset.morph_costs[slot]->build_peak_bytes)));
+  }
+  const auto open = [&](uint32_t level) {
+    return LevelFile::open_known(asset.folder / asset.file_names[level], asset.levels[level].file_bytes,
+                                 asset.file_hashes[level]);
+  };
+  FARFIELD_TRY_LET(const auto fine, open(slot));
+  FARFIELD_TRY_LET(const auto coarse, open(slot + 1));
+  auto loaded = std::make_unique<LoadedMorph>();
+  FARFIELD_TRY_LET(loaded->traced, TracedMorph::build(device, fine->view(), coarse->view(),
+                                                      *asset.traced.loaded[slot].load(std::memory_order_acquire),
+                                                      *asset.traced.loaded[slot + 1].load(std::memory_order_acquire),
+                                                      bytes_left - file_bytes));
+  const LevelCost cost = loaded->traced->cost(fine->view(), coarse->view());
   return LoadedItem{std::move(loaded), cost.resident_bytes, cost.build_peak_bytes};
 }
 
 }  // namespace
 
 uint64_t OpenAsset::table_bytes() const {
-  constexpr uint64_t kPerLevel = sizeof(LevelInfo) + 3 * sizeof(uint64_t) + 2 * sizeof(float) + sizeof(void*) +
-                                 512;  // the ResidentSet's item and its function
-  return sizeof(OpenAsset) + close_up->table_bytes() + traced.hull.capacity() * sizeof(vec3) +
-         levels.size() * kPerLevel;
+  constexpr uint64_t kItem = 512;  // of the ResidentSet, with its function
+  constexpr uint64_t kPerLevel = sizeof(LevelInfo) + 3 * sizeof(uint64_t) + 2 * sizeof(float) + sizeof(void*) + kItem;
+  return sizeof(OpenAsset) + morph_items.size() * kItem + close_up->table_bytes() +
+         traced.hull.capacity() * sizeof(vec3) + levels.size() * kPerLevel;
 }
 
 Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folder, MaterialFunction materials,
@@ -107,6 +145,7 @@ Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folde
   traced.hull.assign(manifest.hull.begin(), manifest.hull.end());
   traced.base_resolution = static_cast<float>(manifest.base_resolution);
   traced.loaded = std::make_unique<std::atomic<const TracedLevel*>[]>(manifest.levels.size());
+  traced.morphs = std::make_unique<std::atomic<const TracedMorph*>[]>(manifest.levels.size());
   for (const LevelEntry& entry : manifest.levels) {
     FARFIELD_TRY(check_level_file(folder / entry.file, entry.file_bytes));
     FARFIELD_TRY(check_planned_bytes(entry, folder));
@@ -115,16 +154,26 @@ Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folde
                              entry.file_bytes, entry.resident_bytes});
     asset->build_peak_bytes.push_back(entry.build_peak_bytes);
     asset->ray_cost.push_back(static_cast<float>(entry.ray_cost));
+    if (entry.level != manifest.levels.front().level) asset->morph_costs.push_back(entry.morph);
     asset->file_names.push_back(entry.file);
     asset->file_hashes.push_back(entry.file_hash);
   }
+  asset->morph_costs.emplace_back();  // the root's
   asset->close_up = std::make_unique<CloseUp>(folder, manifest, std::move(materials), textures);
   return asset;
 }
 
 ResidencyItem make_level_item(const OpenAsset& asset, uint32_t slot, BvhDevice& device) {
   return {asset.levels[slot].resident_bytes, asset.build_peak_bytes[slot],
-          [&asset, slot, &device] { return load_level(asset, slot, asset.folder / asset.file_names[slot], device); }};
+          [&asset, slot, &device](uint64_t bytes_left) {
+            return load_level(asset, slot, asset.folder / asset.file_names[slot], device, bytes_left);
+          }};
+}
+
+ResidencyItem make_morph_item(const OpenAsset& asset, uint32_t slot, BvhDevice& device) {
+  const LevelCost& cost = *asset.morph_costs[slot];
+  return {cost.resident_bytes, cost.build_peak_bytes,
+          [&asset, slot, &device](uint64_t bytes_left) { return load_morph(asset, slot, device, bytes_left); }};
 }
 
 }  // namespace farfield

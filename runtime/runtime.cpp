@@ -5,8 +5,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
 
 #include "runtime/frame_planner.h"
 #include "runtime/host_scene.h"
@@ -22,6 +24,7 @@ Result<void> check_options(const RuntimeOptions& options) {
   if (options.budget_bytes == 0) return invalid("the budget is 0 bytes; give RuntimeOptions::budget_bytes a size");
   if (!(options.pixel_error > 0.0f) || !std::isfinite(options.pixel_error))
     return invalid("pixel_error must be positive");
+  if (!(options.blend_window > 0.0f && options.blend_window <= 1.0f)) return invalid("blend_window must be in (0, 1]");
   if (options.forced_lambda && !std::isfinite(*options.forced_lambda)) return invalid("forced_lambda must be finite");
   return {};
 }
@@ -38,6 +41,21 @@ mat4x3 with_origin(const mat4x3& m, const dvec3& origin, const glm::dmat3& rotat
   return result;
 }
 
+uint64_t bytes_per_instance(const RuntimeOptions& options) {
+  return sizeof(InstanceRecord) + options.scene_bytes_per_instance;
+}
+
+tl::unexpected<Error> no_such_instance(InstanceId instance) {
+  return make_error(ErrorCode::InvalidArgument, fmt::format("there is no instance {}", instance.value));
+}
+
+Result<std::filesystem::path> canonical_folder(const std::string& folder) {
+  std::error_code error;
+  std::filesystem::path canonical = std::filesystem::canonical(folder, error);
+  if (!error) return canonical;
+  return make_error(ErrorCode::NotFound, fmt::format("cannot open the asset {}: {}", folder, error.message()));
+}
+
 }  // namespace
 
 struct Runtime::Impl {
@@ -48,15 +66,20 @@ struct Runtime::Impl {
         planner(options, geometry),
         host(host_device) {
     geometry.forced_lambda = options.forced_lambda;
+    geometry.has_filters = options.has_geometry_filters;
   }
 
-  /// Tells the budget what the instances take. The room that the arrays have beyond was never touched: it is not
-  /// resident.
-  void count_instances() {
-    levels.set_instance_bytes(geometry.instances.size() * (sizeof(InstanceRecord) + options.scene_bytes_per_instance) +
-                              instance_data.size() * sizeof(InstanceData));
+  /// Tells the budget what so many instances take, of which the first `with_data` have data of the host's. The room
+  /// that the arrays have beyond was never touched: it is not resident.
+  Result<void> count_instances(size_t count, size_t with_data) {
+    return levels.set_instance_bytes(count * bytes_per_instance(options) + with_data * sizeof(InstanceData));
   }
-  const TracedLevel* level_of(const HitRecord& hit) const;
+  bool has_instance(InstanceId instance) const {
+    return instance.value < geometry.instances.size() && !free_ids.contains(instance.value);
+  }
+  Result<InstanceRecord> make_record(uint32_t asset, const mat4x3& local_to_world) const;
+  /// What was hit; its level is null if the record is not of a hit, or the level has gone since.
+  HitLevels levels_of(const HitRecord& hit) const;
 
   const RuntimeOptions options;
   Messages messages;
@@ -65,16 +88,24 @@ struct Runtime::Impl {
   FramePlanner planner;
   HostScene host;
   std::vector<InstanceData> instance_data;  ///< per instance, up to the last one that has any
+  std::set<uint32_t> free_ids;              ///< of instances that were removed: the lowest is the next one's
   std::atomic<bool> said_stale_hit{false};
 };
 
-/// The level that was hit; null if the record is not of a hit, or the level has gone since.
-const TracedLevel* Runtime::Impl::level_of(const HitRecord& hit) const {
-  if (hit.instance >= geometry.instances.size()) return nullptr;
+HitLevels Runtime::Impl::levels_of(const HitRecord& hit) const {
+  if (hit.instance >= geometry.instances.size()) return {};
   const TracedAsset& asset = *geometry.assets[geometry.instances[hit.instance].asset];
-  if (hit.level_slot >= asset.slot_count()) return nullptr;
-  const TracedLevel* level = asset.loaded[hit.level_slot].load(std::memory_order_acquire);
-  return level && is_hit_of(*level, hit) ? level : nullptr;
+  if (hit.level_slot >= asset.slot_count()) return {};
+  HitLevels found;
+  if (hit.blend > 0.0f) {
+    found.morph = asset.morphs[hit.level_slot].load(std::memory_order_acquire);
+    if (!found.morph) return {};
+    found.level = hit.is_coarser ? &found.morph->coarse() : &found.morph->fine();
+  } else {
+    found.level = asset.loaded[hit.level_slot].load(std::memory_order_acquire);
+  }
+  if (found.level && !is_hit_of(*found.level, hit)) return {};
+  return found;
 }
 
 Runtime::Runtime() = default;
@@ -90,16 +121,22 @@ Result<std::unique_ptr<Runtime>> Runtime::create(RTCDevice host_device, const Ru
 }
 
 Result<AssetId> Runtime::open_asset(const std::string& folder, MaterialFunction materials) {
-  std::error_code error;
-  const std::filesystem::path canonical = std::filesystem::canonical(folder, error);
-  if (error) {
-    return make_error(ErrorCode::NotFound, fmt::format("cannot open the asset {}: {}", folder, error.message()));
-  }
+  FARFIELD_TRY_LET(const auto canonical, canonical_folder(folder));
   Impl& impl = *impl_;
-  impl.count_instances();
   FARFIELD_TRY_LET(const uint32_t asset, impl.levels.open(canonical, std::move(materials)));
   if (asset == impl.geometry.assets.size()) impl.geometry.assets.push_back(&impl.levels.asset(asset).traced);
   return AssetId{asset};
+}
+
+Result<uint64_t> Runtime::least_budget(const std::vector<std::string>& folders, uint64_t instance_count,
+                                       const RuntimeOptions& options) {
+  std::set<std::filesystem::path> each_once;
+  for (const std::string& folder : folders) {
+    FARFIELD_TRY_LET(auto canonical, canonical_folder(folder));
+    each_once.insert(std::move(canonical));
+  }
+  return LevelStore::least_bytes(std::vector(each_once.begin(), each_once.end()),
+                                 instance_count * bytes_per_instance(options));
 }
 
 const std::string& Runtime::material_name(const Interaction& interaction) const {
@@ -121,22 +158,65 @@ void Runtime::bounds(AssetId asset, glm::vec3& lower, glm::vec3& upper) const {
   upper = box.upper;
 }
 
+Result<InstanceRecord> Runtime::Impl::make_record(uint32_t asset, const mat4x3& local_to_world) const {
+  const OpenAsset& opened = levels.asset(asset);
+  FARFIELD_TRY_LET(auto record, make_instance(asset, with_origin(local_to_world, opened.origin, opened.rotation)));
+  record.footprint.world_to_r0 = options.pixel_error / largest_stretch(local_to_world);
+  return record;
+}
+
 Result<InstanceId> Runtime::add_instance(AssetId asset, const glm::mat4x3& local_to_world, const InstanceData& data) {
-  if (asset.value >= impl_->levels.asset_count()) {
+  Impl& impl = *impl_;
+  if (asset.value >= impl.levels.asset_count()) {
     return make_error(ErrorCode::InvalidArgument, fmt::format("there is no asset {}", asset.value));
   }
-  std::vector<InstanceRecord>& instances = impl_->geometry.instances;
-  if (instances.size() >= kNoInstance) return make_error(ErrorCode::InvalidArgument, "too many instances");
-  const OpenAsset& opened = impl_->levels.asset(asset.value);
-  FARFIELD_TRY_LET(auto record,
-                   make_instance(asset.value, with_origin(local_to_world, opened.origin, opened.rotation)));
-  record.footprint.world_to_r0 = impl_->options.pixel_error / largest_stretch(local_to_world);
-  instances.push_back(record);
-  if (data != InstanceData()) {
-    impl_->instance_data.resize(instances.size());
-    impl_->instance_data.back() = data;
+  FARFIELD_TRY_LET(auto record, impl.make_record(asset.value, local_to_world));
+  std::vector<InstanceRecord>& instances = impl.geometry.instances;
+  const bool is_new = impl.free_ids.empty();
+  if (is_new && instances.size() >= kNoInstance) return make_error(ErrorCode::InvalidArgument, "too many instances");
+  const size_t id = is_new ? instances.size() : *impl.free_ids.begin();
+  const size_t with_data =
+      data == InstanceData() ? impl.instance_data.size() : std::max(impl.instance_data.size(), id + 1);
+  FARFIELD_TRY(impl.count_instances(instances.size() + is_new, with_data));
+
+  impl.instance_data.resize(with_data);
+  if (id < with_data) impl.instance_data[id] = data;
+  const InstanceId added{static_cast<uint32_t>(id)};
+  if (is_new) {
+    instances.push_back(record);
+    return added;
   }
-  return InstanceId{static_cast<uint32_t>(instances.size() - 1)};
+  impl.free_ids.erase(impl.free_ids.begin());
+  instances[id] = record;
+  impl.geometry.set_hidden(added.value, false);
+  impl.planner.note_moved(added.value);
+  return added;
+}
+
+Result<void> Runtime::move_instance(InstanceId instance, const glm::mat4x3& local_to_world) {
+  Impl& impl = *impl_;
+  if (!impl.has_instance(instance)) return no_such_instance(instance);
+  InstanceRecord& record = impl.geometry.instances[instance.value];
+  FARFIELD_TRY_LET(record, impl.make_record(record.asset, local_to_world));
+  impl.planner.note_moved(instance.value);
+  return {};
+}
+
+Result<void> Runtime::set_visible(InstanceId instance, bool is_visible) {
+  Impl& impl = *impl_;
+  if (!impl.has_instance(instance)) return no_such_instance(instance);
+  impl.geometry.set_hidden(instance.value, !is_visible);
+  impl.planner.note_moved(instance.value);
+  return {};
+}
+
+Result<void> Runtime::remove_instance(InstanceId instance) {
+  Impl& impl = *impl_;
+  if (!impl.has_instance(instance)) return no_such_instance(instance);
+  impl.geometry.set_hidden(instance.value, true);
+  impl.free_ids.insert(instance.value);
+  if (instance.value < impl.instance_data.size()) impl.instance_data[instance.value] = {};
+  return {};
 }
 
 InstanceData Runtime::instance_data(const Interaction& interaction) const {
@@ -146,10 +226,7 @@ InstanceData Runtime::instance_data(const Interaction& interaction) const {
 
 void Runtime::set_cameras(std::vector<TessellationCamera> cameras) { impl_->planner.set_cameras(std::move(cameras)); }
 
-Result<PlanSummary> Runtime::plan_frame() {
-  impl_->count_instances();
-  return impl_->planner.plan(impl_->levels);
-}
+Result<PlanSummary> Runtime::plan_frame() { return impl_->planner.plan(impl_->levels); }
 
 void Runtime::prefetch() { impl_->planner.prefetch(impl_->levels); }
 
@@ -158,13 +235,13 @@ Result<unsigned> Runtime::attach(RTCScene scene) { return impl_->host.attach(sce
 unsigned Runtime::geometry_id() const { return impl_->host.geometry_id(); }
 
 Interaction Runtime::interaction(const RTCRayHit& ray_hit, const RayContext& context) const {
-  const TracedLevel* level = impl_->level_of(context.hit);
-  if (!level) {
+  const HitLevels levels = impl_->levels_of(context.hit);
+  if (!levels.level) {
     impl_->messages.report_once(impl_->said_stale_hit, Severity::Error,
                                 "interaction() of what is no hit of ours since the last plan_frame(); it is black");
     return {};
   }
-  return make_interaction(*level, impl_->geometry.instances[context.hit.instance], ray_hit, context.hit);
+  return make_interaction(levels, impl_->geometry.instances[context.hit.instance], ray_hit, context.hit);
 }
 
 Stats Runtime::stats() const {

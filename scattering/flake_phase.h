@@ -86,13 +86,16 @@ class FlakeModel {
 
   using Flake = SurfaceModel<kChannels & kSurfaceChannels>;
 
-  vec3 set_up_specular(const FlakeParams& params, const SymMat3& s) requires(kHasSpecular);
-  void set_up_multiple(const FlakeParams& params, const SymMat3& s, const vec3& highlight) requires(kHasMultiple);
+  // Constraints in terms of kChannels alone: clang 14 does not find members of the class in those of a definition
+  // outside.
+  vec3 set_up_specular(const FlakeParams& params, const SymMat3& s) requires((kChannels & kSpecular) != 0);
+  void set_up_multiple(const FlakeParams& params, const SymMat3& s,
+                       const vec3& highlight) requires((kChannels & kSelfShadowing) != 0);
   float single_share() const;
-  float multiple_density(const vec3& wi) const requires(kHasMultiple);
+  float multiple_density(const vec3& wi) const requires((kChannels & kSelfShadowing) != 0);
   bool scatters_once() const { return chances_.specular + chances_.diffuse + chances_.transmission > 0; }
   Flake sample_flake(Rng& rng) const;
-  void open(const vec3& normal, SurfaceParams& params) const requires(kHasBase);
+  void open(const vec3& normal, SurfaceParams& params) const requires((kChannels & (kDiffuse | kTransmission)) != 0);
 
   CholeskyFactor<float> flakes_;
   vec3 wo_;

@@ -70,7 +70,8 @@ FlakeModel<kChannels>::FlakeModel(const FlakeParams& params, const vec3& wo)
 
 // Returns what the highlight gives back of light from everywhere.
 template <unsigned kChannels>
-vec3 FlakeModel<kChannels>::set_up_specular(const FlakeParams& params, const SymMat3& s) requires(kHasSpecular) {
+vec3 FlakeModel<kChannels>::set_up_specular(const FlakeParams& params,
+                                            const SymMat3& s) requires((kChannels & kSpecular) != 0) {
   const float roughness2 = params.roughness2 < 1.0f ? std::max(params.roughness2, 0.0f) : 1.0f;
   const Highlight highlight(params.specular, roughness2);
   if (!highlight.exists()) return vec3(0.0f);
@@ -86,7 +87,7 @@ vec3 FlakeModel<kChannels>::set_up_specular(const FlakeParams& params, const Sym
 
 template <unsigned kChannels>
 void FlakeModel<kChannels>::set_up_multiple(const FlakeParams& params, const SymMat3& s,
-                                            const vec3& highlight) requires(kHasMultiple) {
+                                            const vec3& highlight) requires((kChannels & kSelfShadowing) != 0) {
   if (!(params.self_shadowing < 1)) return;
   vec3 base(0.0f);
   if constexpr (kHasDiffuse) base += diffuse_;
@@ -127,13 +128,14 @@ typename FlakeModel<kChannels>::Flake FlakeModel<kChannels>::sample_flake(Rng& r
 }
 
 template <unsigned kChannels>
-void FlakeModel<kChannels>::open(const vec3& normal, SurfaceParams& params) const requires(kHasBase) {
+void FlakeModel<kChannels>::open(const vec3& normal, SurfaceParams& params) const
+    requires((kChannels & (kDiffuse | kTransmission)) != 0) {
   const vec3 gain = open_side_gain(open_side_, normal, params.diffuse + params.transmission);
   params.diffuse *= gain, params.transmission *= gain;
 }
 
 template <unsigned kChannels>
-float FlakeModel<kChannels>::multiple_density(const vec3& wi) const requires(kHasMultiple) {
+float FlakeModel<kChannels>::multiple_density(const vec3& wi) const requires((kChannels & kSelfShadowing) != 0) {
   return multiple_.norm * Sggx(flakes_).sigma(wi) * (1.0f + glm::dot(wo_, wi));
 }
 

@@ -59,7 +59,7 @@ class SurfaceModel {
     float lean = 0;
   };
 
-  void couple_to_highlight(const SurfaceParams& params) requires(kHasSpecular);
+  void couple_to_highlight(const SurfaceParams& params) requires((kChannels & kSpecular) != 0);
 
   vec3 n_, wo_;
   float cos_o_;

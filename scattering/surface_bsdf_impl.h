@@ -29,7 +29,7 @@ SurfaceModel<kChannels>::SurfaceModel(const SurfaceParams& params, const vec3& n
 
 // Sets up the highlight and takes from the base what it returns, here where that depends on wo alone.
 template <unsigned kChannels>
-void SurfaceModel<kChannels>::couple_to_highlight(const SurfaceParams& params) requires(kHasSpecular) {
+void SurfaceModel<kChannels>::couple_to_highlight(const SurfaceParams& params) requires((kChannels & kSpecular) != 0) {
   const Highlight highlight(params.specular, params.roughness2);
   if (!highlight.exists()) return;
   const HighlightShare share = highlight.share(cos_o_);

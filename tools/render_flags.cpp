@@ -22,9 +22,9 @@ namespace {
 
 Result<Blend> parse_blend(const std::string& text) {
   if (text == "dissolve") return Blend::Dissolve;
-  if (text == "morph")
-    return make_error(ErrorCode::Unsupported, "this version cannot morph; levels carry the data, dissolve works");
-  return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a way to blend; dissolve is", text));
+  if (text == "morph") return Blend::Morph;
+  return make_error(ErrorCode::InvalidArgument,
+                    fmt::format("\"{}\" is not a way to blend; dissolve and morph are", text));
 }
 
 }  // namespace
@@ -48,8 +48,15 @@ void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std:
   command->add_option("--seed", options.trace.seed, "Of the random numbers");
   command->add_option("--assets", arguments.assets,
                       "Folder of baked assets; what is missing is baked. Without it farfield-assets beside the scene");
-  add_parsed_option(command, "--blend", options.blend, parse_blend, "How neighbouring levels are mixed: dissolve")
+  add_parsed_option(command, "--blend", options.blend, parse_blend,
+                    "How neighbouring levels are mixed: dissolve (each path sees one of them) or morph (they change "
+                    "into each other in place; more memory, slower)")
       ->default_str("dissolve");
+  command
+      ->add_option("--blend-window", options.blend_window,
+                   "Octaves of distance before a coarser level over which it blends with the finer one")
+      ->check(CLI::Range(0.001, 1.0))
+      ->default_str("1");
   CLI::Option* environment = command->add_option("--environment", arguments.environment,
                                                  "Light from a latitude-longitude picture, EXR or Radiance HDR");
   command->add_flag("!--no-sky", options.sky, "No sun and sky: the scene's own lights alone")->excludes(environment);
@@ -60,7 +67,7 @@ void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std:
                    "else 24")
       ->check(CLI::Range(0.001, 1e6));
   command->add_option("--exposure", options.exposure_stops, "Of the PNG previews, in stops")
-      ->check(CLI::Range(-50, 50));
+      ->check(CLI::Range(-50.0, 50.0));
   add_parsed_option(command, "--assemblies", options.assemblies, parse_assembly_rule,
                     "What is baked as one: trees of several meshes that the scene repeats, or only what it marks, or "
                     "nothing: repeated, marked, none")

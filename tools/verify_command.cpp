@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "cache/verify.h"
+#include "bake/measure_levels.h"
 
 #include <fmt/format.h>
 
@@ -17,7 +17,7 @@ Result<void> run_verify(const std::string& asset) {
   std::error_code error;
   if (!std::filesystem::is_directory(asset, error))
     return make_error(ErrorCode::NotFound, fmt::format("{}: there is no such folder", asset));
-  const VerifyResult result = verify_asset(asset);
+  const VerifyResult result = verify_and_measure_asset(asset);
   for (const Finding& finding : result.findings)
     fmt::print("{}: {}\n", finding.severity == Finding::Severity::Error ? "error" : "warning",
                one_line(finding.message));

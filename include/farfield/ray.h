@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 
 #include "farfield/embree.h"
 
@@ -16,16 +17,33 @@ struct HitRecord {
   uint32_t element = 0;    ///< 2 * quad + side of its diagonal, or payload index of the voxel
   uint8_t level_slot = 0;  ///< index into the asset's stored levels
   bool is_volume = false;
+  bool is_coarser = false;            ///< of a morph: `element` is of the level after level_slot
+  float blend = 0;                    ///< in (0, 1): of a morph from level_slot to the next; 0: of that level alone
   float lambda = 0;                   ///< continuous level that was asked for
   float footprint = 0;                ///< world width of what the ray stands for there
   float normal_local[3] = {0, 0, 0};  ///< geometric normal, instance space, unnormalised; surfaces only
   float barycentric[2] = {0, 0};      ///< weights of the face's second and third corner; surfaces only
 };
 
+namespace detail {
+/// Bits of RTCIntersectContext::flags that Embree does not look at: by them Farfield knows what it may cast the context
+/// to. Not an enumerator, so copied as bytes.
+inline constexpr uint32_t kRayContextMark = 0x46460000u;
+inline constexpr uint32_t kRayContextsMark = 0x46470000u;
+inline void mark(RTCIntersectContext& context, uint32_t mark, bool is_coherent = false) {
+  static_assert(sizeof context.flags == sizeof mark, "Embree's flags are an int");
+  if (is_coherent) mark |= uint32_t{RTC_INTERSECT_CONTEXT_FLAG_COHERENT};
+  std::memcpy(&context.flags, &mark, sizeof mark);
+}
+}  // namespace detail
+
 /// The context to pass to rtcIntersect1 and rtcOccluded1 for rays that may meet Farfield geometry:
-/// `rtcIntersect1(scene, &ray_context.embree, &ray_hit)`. Farfield casts the context pointer back, so every single-ray
-/// query on a scene with Farfield geometry must pass one of these. Fill it anew for every ray. For packets and streams
-/// all lanes share one, and only distances and occlusion come back.
+/// `rtcIntersect1(scene, &ray_context.embree, &ray_hit)`. Fill it anew for every ray. Leave embree.flags alone
+/// but for set_coherent(); embree.filter is yours.
+///
+/// A query with another context is answered too: as that of a ray without width, whose random numbers come from its
+/// origin and direction, and of which nothing but distance, normal and ids is known afterwards. For packets and streams
+/// see RayContexts; with a RayContext all their lanes share it, but only distances, normals and ids come back.
 struct RayContext {
   RTCIntersectContext embree;  ///< first member; initialised by the constructor
 
@@ -38,16 +56,39 @@ struct RayContext {
   // In: where the ray starts. A ray that leaves a Farfield hit keeps that hit's level on the same instance.
   uint32_t origin_instance = kNoInstance;
   uint8_t origin_level_slot = 0;
+  float origin_blend = 0;
 
   // Out: valid after rtcIntersect1 if and only if ray_hit.hit.geomID is Runtime::geometry_id().
   HitRecord hit;
 
-  RayContext() { rtcInitIntersectContext(&embree); }
+  RayContext() {
+    rtcInitIntersectContext(&embree);
+    detail::mark(embree, detail::kRayContextMark);
+  }
+  /// For packets and streams: Embree's RTC_INTERSECT_CONTEXT_FLAG_COHERENT, or _INCOHERENT, the default.
+  void set_coherent(bool is_coherent) { detail::mark(embree, detail::kRayContextMark, is_coherent); }
   /// Says that the ray starts at `from`, a hit on Farfield geometry.
   void set_origin(const HitRecord& from) {
     origin_instance = from.instance;
     origin_level_slot = from.level_slot;
+    origin_blend = from.blend;
   }
+};
+
+/// The context to pass for packets and streams, with one RayContext for each ray: rtcIntersect4, 8, 16, 1M, Np and the
+/// occlusion queries. RTCRay::id says which: the ray's index in `rays`, whatever order Embree works in. After the query
+/// each has its own hit; Runtime::interaction() takes it with the ray's RTCRayHit as for a single ray. A ray whose id
+/// is not below `count` is treated as with another context (see RayContext).
+struct RayContexts {
+  RTCIntersectContext embree;  ///< first member; initialised by the constructor
+  RayContext* rays;
+  uint32_t count;
+
+  RayContexts(RayContext* of_rays, uint32_t ray_count) : rays(of_rays), count(ray_count) {
+    rtcInitIntersectContext(&embree);
+    detail::mark(embree, detail::kRayContextsMark);
+  }
+  void set_coherent(bool is_coherent) { detail::mark(embree, detail::kRayContextsMark, is_coherent); }
 };
 
 }  // namespace farfield

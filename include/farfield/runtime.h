@@ -45,6 +45,8 @@ namespace farfield {
 /// How two neighbouring levels are mixed (docs/architecture.md, decision 3).
 enum class Blend : uint8_t {
   Dissolve,  ///< each path sees one of the two, picked by RayContext::path_seed
+  Morph,     ///< vertices move, materials mix, and what one of the two lacks fades, all in place; where the memory for
+             ///< that does not fit the budget, or the asset was baked before there were morphs, it dissolves
 };
 
 /// What a ray does that needs a level which the plan allows but which is not loaded yet.
@@ -64,13 +66,19 @@ inline constexpr uint32_t kSceneBytesPerInstance = 120;
 inline constexpr uint32_t kSmallSceneBytesPerInstance = 64;
 
 struct RuntimeOptions {
-  uint64_t budget_bytes = uint64_t{1} << 32;  ///< hard: mapped, heap and Embree bytes together, build peaks included
+  uint64_t budget_bytes = uint64_t{1} << 32;  ///< hard: levels, heap and Embree's bytes together, build peaks included
   Blend blend = Blend::Dissolve;
+  float blend_window = 1.0f;  ///< octaves before a coarser level in which it blends with the finer one; in (0, 1]
   Residency residency = Residency::Wait;
   float pixel_error = 1.0f;            ///< pixels: how wide the voxels of a level may look; the budget aside. > 0
   std::optional<float> forced_lambda;  ///< every ray sees this lambda, whatever its footprint; for evaluation
   uint32_t scene_bytes_per_instance = kSceneBytesPerInstance;  ///< of the scene that attach() will be given
-  MessageSink messages;                                        ///< may be empty
+  /// The host has given our geometry filter functions (rtcSetGeometryIntersectFilterFunction with the geometry of
+  /// geometry_id()): they are called for our hits, and occlusion queries look for nearest hits then, which costs. A
+  /// filter in the query's context is called without this. Filters get one ray and its nearest hit in an instance, as
+  /// rtcIntersect1 would return it; what they refuse, the ray passes, and goes on behind it.
+  bool has_geometry_filters = false;
+  MessageSink messages;  ///< may be empty
 };
 
 struct AssetId {
@@ -96,7 +104,9 @@ struct PlanSummary {
   uint64_t planned_bytes = 0;  ///< if everything the plan allows were loaded, build peak included; <= the budget
   double bias = 0;             ///< pixel-weighted mean of how many levels coarser than asked; 0: nothing given up
   std::vector<float> levels_given_up;  ///< per asset: how many levels coarser than its finest instances ask
-  uint64_t asked_bytes = 0;            ///< a budget that gives nothing up in this frame
+  uint64_t asked_bytes = 0;            ///< a budget that gives nothing up in this frame; without morphs
+  uint32_t morphs = 0;                 ///< pairs of levels that morph
+  uint32_t morphs_given_up = 0;        ///< pairs that instances would see morph if they fit; they dissolve
 };
 
 /// Counters since create(). Thread-safe snapshot.
@@ -107,7 +117,7 @@ struct Stats {
   uint64_t levels_resident = 0;
   uint64_t levels_released = 0;
   uint64_t fallbacks = 0;  ///< visits of rays to instances that a coarser level served (progressive mode, broken files)
-  double load_seconds = 0;  ///< summed over loads: map, check, build
+  double load_seconds = 0;  ///< summed over loads: read, check, build
 };
 
 /// Thread rule: interaction(), stats() and all ray queries are safe from any thread at any time between two
@@ -127,6 +137,12 @@ class FARFIELD_API Runtime {
   /// called by rays from any thread, and must answer as it did in the bake for levels to match. Only the first opening
   /// of a folder counts.
   Result<AssetId> open_asset(const std::string& folder, MaterialFunction materials = {});
+  /// The smallest budget in which all these folders open and so many instances of them can be planned: coarsest levels,
+  /// tables, records, the host's scene; of `options` what an instance takes there. Reads the manifests alone. What
+  /// single calls name in their errors is for the assets and instances that there were by then. Errors: those of
+  /// open_asset() but OutOfBudget.
+  static Result<uint64_t> least_budget(const std::vector<std::string>& folders, uint64_t instance_count,
+                                       const RuntimeOptions& options = {});
   /// The name that the source gives a material of the instance's asset; empty for one that there is not.
   const std::string& material_name(const Interaction& interaction) const;
   /// The asset's stored levels, finest first; none for an id that open_asset() did not give.
@@ -137,8 +153,20 @@ class FARFIELD_API Runtime {
 
   /// Adds an instance: 64 bytes of the budget, and those of the host's scene. local_to_world: affine, invertible,
   /// finite. data: for the host, see instance_data(); 24 bytes more for each instance once one has other data than the
-  /// default. Errors: InvalidArgument.
+  /// default. Counted at once: where it has no room beside the levels that are loaded, all but the coarsest are
+  /// released until the next plan. Errors: InvalidArgument; OutOfBudget (the message has the number that would do, so
+  /// far).
   Result<InstanceId> add_instance(AssetId asset, const glm::mat4x3& local_to_world, const InstanceData& data = {});
+  /// Moves an instance. As with add_instance(), rays may fly again after plan_frame(), attach() and a commit of the
+  /// scene; nothing else is built anew. Errors: InvalidArgument (no such instance, or as for add_instance; it stays
+  /// where it is).
+  Result<void> move_instance(InstanceId instance, const glm::mat4x3& local_to_world);
+  /// Hides an instance from all rays and plans, or shows it again; likewise. Errors: InvalidArgument (no such
+  /// instance).
+  Result<void> set_visible(InstanceId instance, bool is_visible);
+  /// Removes an instance; likewise. The next add_instance() takes its place, and with it its id and its bytes. Errors:
+  /// InvalidArgument (no such instance).
+  Result<void> remove_instance(InstanceId instance);
   /// What add_instance() was given for the instance that was hit; the default for what is no hit of ours. Safe from any
   /// thread, as interaction() is.
   InstanceData instance_data(const Interaction& interaction) const;

@@ -138,7 +138,7 @@ class Bench : public LevelSource {
     const EmbreeGeometry mesh = new_quads(host_.get());
     copy_array<vec3>(mesh.get(), level.positions);
     copy_array<Quad>(mesh.get(), level.quads);
-    const EmbreeScene object = build_static_scene(host_.get(), mesh.get());
+    const EmbreeScene object = build_static_scene(host_.get(), mesh);
     EmbreeScene scene = new_scene(host_.get());
     for (const mat4x3& m : places) {
       attach_geometry(scene.get(), new_native_instance(host_.get(), object.get(), m).get());

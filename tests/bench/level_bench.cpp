@@ -88,7 +88,7 @@ EmbreeScene native_scene(EmbreeDeviceRef device, const LevelView& level, const s
   const EmbreeGeometry quads = new_quads(device);
   copy_array(quads.get(), level.positions);
   copy_array(quads.get(), level.quads);
-  const EmbreeScene object = build_static_scene(device, quads.get());
+  const EmbreeScene object = build_static_scene(device, quads);
   EmbreeScene scene = new_scene(device);
   for (const mat4x3& place : places) {
     attach_geometry(scene.get(), new_native_instance(device, object.get(), place).get());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How far does the picture of a baked asset jump where lambda passes a level, and over the levels around it?
 //
-//   build/release/bin/pop_figures ASSET.farfield
+//   build/release/bin/pop_figures ASSET.farfield [morph]
 //
 // For each stored level k: the same view with the same random numbers at lambda k - 1e-3 and k + 1e-3 (the pop of
 // docs/error_metric.md, before two seeds are taken off), the same at k - 1e-3 with another seed, and how the mean
@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <string_view>
 
 #include "evaluate/views.h"
 #include "path_tracer/asset_view.h"
@@ -19,13 +20,15 @@ namespace {
 constexpr int kSamplesPerPixel = 256;
 constexpr float kBeside = 1e-3f;
 
+Blend blend = Blend::Dissolve;
+
 struct Picture {
   Image image;
   double mean = 0;
 };
 
 Result<Picture> render(const char* folder, float lambda, double pixel_size, uint64_t seed) {
-  auto asset = AssetView::open(folder, lambda);
+  auto asset = AssetView::open(folder, lambda, uint64_t{1} << 36, blend);
   if (!asset) return tl::unexpected(asset.error());
   const OrthoView view =
       frame_view((*asset)->bounds(), glm::normalize(vec3(-1.0f, -0.3f, -0.6f)), static_cast<float>(pixel_size));
@@ -82,10 +85,12 @@ Result<void> print_all(const char* folder) {
 }  // namespace farfield
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    fmt::print(stderr, "usage: pop_figures ASSET.farfield\n");
+  const bool morphs = argc == 3 && std::string_view(argv[2]) == "morph";
+  if (argc != 2 && !morphs) {
+    fmt::print(stderr, "usage: pop_figures ASSET.farfield [morph]\n");
     return 2;
   }
+  if (morphs) farfield::blend = farfield::Blend::Morph;
   if (auto done = farfield::print_all(argv[1]); !done) {
     fmt::print(stderr, "pop_figures: {}\n", done.error().message);
     return 1;

@@ -48,7 +48,7 @@ void write_entry(const std::filesystem::path& folder, const LevelData& level, co
 }  // namespace
 
 Manifest write_asset(const std::filesystem::path& folder, const std::vector<LevelData>& levels,
-                     const MeasureLevel& measure, dvec3 origin) {
+                     const MeasureLevel& measure, dvec3 origin, const MeasureMorph& measure_morph) {
   std::filesystem::create_directories(folder);
   Manifest manifest;
   manifest.generator = "test";
@@ -59,6 +59,7 @@ Manifest write_asset(const std::filesystem::path& folder, const std::vector<Leve
     LevelEntry& entry = manifest.levels.emplace_back();
     entry.grid = 1;
     write_entry(folder, level, measure, entry, manifest.bounds);
+    if (measure_morph && &level != &levels[0]) entry.morph = measure_morph(view_of(*(&level - 1)), view_of(level));
   }
   or_stop(write_manifest(folder, manifest));
   return manifest;

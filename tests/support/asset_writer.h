@@ -14,9 +14,13 @@ namespace farfield::test {
 /// What a level will take in memory.
 using MeasureLevel = std::function<LevelCost(const LevelView&)>;
 
-/// Writes an asset of these levels, finest first. Stops the test program if it cannot. Returns the manifest.
+/// What the morph between two levels will take.
+using MeasureMorph = std::function<LevelCost(const LevelView& fine, const LevelView& coarse)>;
+
+/// Writes an asset of these levels, finest first; without measure_morph they dissolve. Stops the test program if it
+/// cannot. Returns the manifest.
 Manifest write_asset(const std::filesystem::path& folder, const std::vector<LevelData>& levels,
-                     const MeasureLevel& measure, dvec3 origin = dvec3(0.0));
+                     const MeasureLevel& measure, dvec3 origin = dvec3(0.0), const MeasureMorph& measure_morph = {});
 
 /// A manifest of three levels (0, 1 and 3).
 Manifest sample_manifest();

@@ -20,7 +20,7 @@ class MeshScene {
     const EmbreeGeometry triangles = new_triangles(device_.get());
     copy_array<vec3>(triangles.get(), surface.positions);
     copy_array<uvec3>(triangles.get(), surface.triangles);
-    scene_ = build_static_scene(device_.get(), triangles.get());
+    scene_ = build_static_scene(device_.get(), triangles);
   }
 
   bool is_hit(const vec3& origin, const vec3& direction) const {

@@ -9,19 +9,21 @@
 #include "base/hash.h"
 #include "base/parallel.h"
 #include "bvh/level_scene.h"
+#include "bvh/traced_morph.h"
 #include "tests/support/asset_writer.h"
 #include "tests/support/random_unit.h"
 
 namespace farfield::test {
 
 void write_asset(const std::filesystem::path& folder, const std::vector<LevelData>& levels, dvec3 origin) {
-  const auto measure = [](const LevelView& level) {
-    const auto cost = measure_level_scene(level);
+  const auto or_stop = [](const Result<LevelCost>& cost) {
     if (!cost) ADD_FAILURE() << cost.error().message;
     FARFIELD_CHECK(cost.has_value());
     return *cost;
   };
-  write_asset(folder, levels, measure, origin);
+  write_asset(
+      folder, levels, [&](const LevelView& level) { return or_stop(measure_level_scene(level)); }, origin,
+      [&](const LevelView& fine, const LevelView& coarse) { return or_stop(measure_morph(fine, coarse)); });
 }
 
 Host::Host(RuntimeOptions options) : device_(*make_embree_device()) {

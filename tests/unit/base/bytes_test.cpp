@@ -21,8 +21,13 @@ TEST(ParseBytes, ReadsWhatPeopleWrite) {
   EXPECT_EQ(parse_bytes("12B").value(), 12u);
 }
 
+TEST(ParseBytes, ReadsWhatFormatBytesWrites) {
+  for (const uint64_t bytes : {uint64_t{0}, uint64_t{1023}, uint64_t{1536}, uint64_t{1} << 30, uint64_t{5} << 40})
+    EXPECT_EQ(parse_bytes(format_bytes(bytes)).value_or(1), bytes) << format_bytes(bytes);
+}
+
 TEST(ParseBytes, RefusesTheRest) {
-  for (const char* text : {"", "x", "-1", "12Q", "1KK", "1e300", "nan", "inf", " 5", "G"}) {
+  for (const char* text : {"", "x", "-1", "12Q", "1KK", "1e300", "nan", "inf", " 5", "G", "5 ", "5  M", "5 M B"}) {
     const Result<uint64_t> result = parse_bytes(text);
     ASSERT_FALSE(result) << text;
     EXPECT_EQ(result.error().code, ErrorCode::InvalidArgument);

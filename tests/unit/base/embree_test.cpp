@@ -25,7 +25,7 @@ class Embree : public testing::Test {
     EXPECT_TRUE(result) << result.error().message;
   }
 
-  EmbreeScene build(const EmbreeGeometry& geometry) { return build_static_scene(device_.get(), geometry.get()); }
+  EmbreeScene build(const EmbreeGeometry& geometry) { return build_static_scene(device_.get(), geometry); }
   EmbreeGeometry copied_triangles(const Squares& squares) {
     EmbreeGeometry geometry = new_triangles(device_.get());
     copy_array<vec3>(geometry.get(), squares.positions);
@@ -130,7 +130,7 @@ TEST_F(Embree, TheMonitorCountsAllThatIsTakenAndGivenBack) {
     const Squares squares;
     copy_array<vec3>(geometry.get(), squares.positions);
     copy_array<uvec4>(geometry.get(), squares.quads);
-    const EmbreeScene scene = build_static_scene(device.get(), geometry.get());
+    const EmbreeScene scene = build_static_scene(device.get(), geometry);
     EXPECT_GT(bytes, 0);
   }
   EXPECT_EQ(bytes, 0);

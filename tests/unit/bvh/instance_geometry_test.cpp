@@ -135,7 +135,7 @@ Counts compare_with_flattened(const LevelData& level, int instance_count, uint64
   }
   const EmbreeSceneRef scene = stage.scene();
   const EmbreeGeometry mesh = flatten(stage.host_device(), level, transforms);
-  const EmbreeScene plain = build_static_scene(stage.host_device(), mesh.get());
+  const EmbreeScene plain = build_static_scene(stage.host_device(), mesh);
 
   Counts counts;
   for (int i = 0; i < 20000; ++i) {
@@ -303,9 +303,8 @@ TEST(InstanceGeometry, PacketsAndStreamsSeeTheSameDistancesAsSingleRays) {
       RTCRayHit16{}, 16, [&](int* v, RTCRayHit16* p) { rtcIntersect16(v, scene, &context.embree, p); }, "16",
       RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED);
 
-  for (const RTCIntersectContextFlags flags :
-       {RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT, RTC_INTERSECT_CONTEXT_FLAG_COHERENT}) {
-    context.embree.flags = flags;
+  for (const bool is_coherent : {false, true}) {
+    context.set_coherent(is_coherent);
     std::vector<EmbreeRayHit> stream = rays;
     rtcIntersect1M(scene, &context.embree, stream.data(), kRays, sizeof(EmbreeRayHit));
     for (unsigned i = 0; i < kRays; ++i) expect_same(stream[i], i, "1M");
@@ -315,6 +314,169 @@ TEST(InstanceGeometry, PacketsAndStreamsSeeTheSameDistancesAsSingleRays) {
     for (unsigned i = 0; i < kRays; ++i) {
       EXPECT_EQ(shadows[i].tfar < 0.0f, single[i].hit.geomID != kNoGeometry) << i;
     }
+  }
+}
+
+/// Surfaces and volumes in several instances, and rays through them.
+struct Crowd {
+  static constexpr unsigned kInstances = 6;
+  LevelData level = test::white_sphere()[2];
+  Stage stage;
+  std::vector<EmbreeRayHit> rays;
+
+  Crowd() {
+    const uint32_t asset = stage.add_asset({&level});
+    Rng rng(9);
+    for (unsigned i = 0; i < kInstances; ++i) {
+      mat4x3 place(1.0f);
+      place[3] = 1.5f * random_unit(rng);
+      stage.add_instance(asset, place);
+    }
+    for (unsigned i = 0; i < 256; ++i) {
+      const vec3 origin = 6.0f * random_unit(rng);
+      rays.push_back(make_ray_hit(origin, glm::normalize(2.0f * random_unit(rng) - origin)));
+      rays.back().ray.id = i;
+    }
+  }
+};
+
+/// The i-th ray's: it has other random numbers than the others.
+RayContext context_of(unsigned i) {
+  RayContext context;
+  context.cone_spread = 1e-3f;
+  context.ray_seed = 1000 + i;
+  return context;
+}
+
+TEST(InstanceGeometry, RaysOfPacketsAndStreamsHaveTheirOwnContextsAndRecords) {
+  Crowd crowd;
+  const EmbreeSceneRef scene = crowd.stage.scene();
+  std::vector<EmbreeRayHit> single = crowd.rays, stream = crowd.rays;
+  std::vector<RayContext> alone, together;
+  unsigned hits = 0;
+  for (unsigned i = 0; i < single.size(); ++i) {
+    alone.push_back(context_of(i)), together.push_back(context_of(i));
+    hits += trace_nearest(scene, alone[i].embree, single[i]);
+  }
+  ASSERT_GT(hits, 50u);
+  RayContexts contexts(together.data(), static_cast<uint32_t>(together.size()));
+  const auto expect_same_records = [&] {
+    for (unsigned i = 0; i < single.size(); ++i) {
+      ASSERT_EQ(stream[i].hit.geomID, single[i].hit.geomID) << i;
+      if (single[i].hit.geomID == kNoGeometry) continue;
+      EXPECT_EQ(stream[i].ray.tfar, single[i].ray.tfar);
+      EXPECT_EQ(together[i].hit.instance, alone[i].hit.instance);
+      EXPECT_EQ(together[i].hit.element, alone[i].hit.element);
+      EXPECT_EQ(together[i].hit.is_volume, alone[i].hit.is_volume);
+      EXPECT_EQ(together[i].hit.footprint, alone[i].hit.footprint);
+    }
+  };
+  for (const bool is_coherent : {false, true}) {
+    contexts.set_coherent(is_coherent);
+    stream = crowd.rays;
+    for (unsigned i = 0; i < together.size(); ++i) together[i] = context_of(i);
+    rtcIntersect1M(scene, &contexts.embree, stream.data(), static_cast<unsigned>(stream.size()), sizeof(EmbreeRayHit));
+    expect_same_records();
+  }
+
+  stream = crowd.rays;  // the same as packets of 4
+  for (unsigned i = 0; i < together.size(); ++i) together[i] = context_of(i);
+  for (unsigned base = 0; base < stream.size(); base += 4) {
+    alignas(16) const int valid[4] = {-1, -1, -1, -1};
+    RTCRayHit4 packet;
+    auto* rays = reinterpret_cast<RTCRayN*>(&packet.ray);
+    auto* found = reinterpret_cast<RTCHitN*>(&packet.hit);
+    for (unsigned lane = 0; lane < 4; ++lane) {
+      const EmbreeRay& r = stream[base + lane].ray;
+      rtcCopyHitToHitN(found, &stream[base + lane].hit, 4, lane);
+      RTCRayN_org_x(rays, 4, lane) = r.org_x, RTCRayN_org_y(rays, 4, lane) = r.org_y;
+      RTCRayN_org_z(rays, 4, lane) = r.org_z, RTCRayN_dir_x(rays, 4, lane) = r.dir_x;
+      RTCRayN_dir_y(rays, 4, lane) = r.dir_y, RTCRayN_dir_z(rays, 4, lane) = r.dir_z;
+      RTCRayN_tnear(rays, 4, lane) = r.tnear, RTCRayN_tfar(rays, 4, lane) = r.tfar, RTCRayN_time(rays, 4, lane) = 0;
+      RTCRayN_mask(rays, 4, lane) = r.mask, RTCRayN_id(rays, 4, lane) = r.id, RTCRayN_flags(rays, 4, lane) = 0;
+    }
+    rtcIntersect4(valid, scene, &contexts.embree, &packet);
+    for (unsigned lane = 0; lane < 4; ++lane) {
+      stream[base + lane].ray.tfar = RTCRayN_tfar(rays, 4, lane);
+      stream[base + lane].hit = rtcGetHitFromHitN(found, 4, lane);
+    }
+  }
+  expect_same_records();
+}
+
+TEST(InstanceGeometry, AQueryWithoutARayContextIsAnsweredAlikeEachTime) {
+  Crowd crowd;
+  const EmbreeSceneRef scene = crowd.stage.scene();
+  unsigned hits = 0;
+  std::set<float> distances;
+  for (EmbreeRayHit& ray : crowd.rays) {
+    EmbreeContext context = make_context();
+    EmbreeRayHit again = ray;
+    EmbreeRay shadow = ray.ray;
+    const bool is_hit = trace_nearest(scene, context, ray);
+    EXPECT_EQ(trace_nearest(scene, context, again), is_hit);
+    EXPECT_EQ(again.ray.tfar, ray.ray.tfar);
+    EXPECT_EQ(trace_occlusion(scene, context, shadow), is_hit);
+    if (!is_hit) continue;
+    ++hits;
+    EXPECT_EQ(ray.hit.geomID, crowd.stage.geom_id);
+    EXPECT_LT(ray.hit.primID, Crowd::kInstances);
+    distances.insert(ray.ray.tfar);
+  }
+  EXPECT_GT(hits, 50u);
+  EXPECT_GT(distances.size(), hits / 2);
+}
+
+/// A host's filter that lets rays pass all instances but one, and counts what it is asked.
+struct OnlyInstance {
+  RayContext context;  // first: the filter finds the rest by it
+  unsigned wanted = 0;
+  unsigned geometry = 0;
+  int asked = 0;
+  bool is_sane = true;
+
+  static void filter(const RTCFilterFunctionNArguments* args) {
+    auto& self = *reinterpret_cast<OnlyInstance*>(args->context);
+    ++self.asked;
+    const unsigned instance = RTCHitN_primID(args->hit, args->N, 0);
+    self.is_sane = self.is_sane && args->N == 1 && instance < Crowd::kInstances &&
+                   RTCHitN_geomID(args->hit, 1, 0) == self.geometry && RTCRayN_tfar(args->ray, 1, 0) > 0.0f;
+    if (instance != self.wanted) args->valid[0] = 0;
+  }
+};
+
+TEST(InstanceGeometry, FiltersOfTheHostAreAskedAboutHitsAndRaysPassWhatTheyRefuse) {
+  for (const bool in_context : {true, false}) {
+    Crowd crowd;
+    crowd.stage.geometry().has_filters = !in_context;
+    const EmbreeSceneRef scene = crowd.stage.scene();
+    if (!in_context) {
+      const RTCGeometry geometry = rtcGetGeometry(scene, crowd.stage.geom_id);
+      rtcSetGeometryIntersectFilterFunction(geometry, OnlyInstance::filter);
+      rtcSetGeometryOccludedFilterFunction(geometry, OnlyInstance::filter);
+      rtcCommitGeometry(geometry);
+      rtcCommitScene(scene);
+    }
+    int asked = 0, hits = 0, refused = 0;
+    for (unsigned i = 0; i < crowd.rays.size(); ++i) {
+      for (unsigned wanted = 0; wanted < Crowd::kInstances; ++wanted) {
+        OnlyInstance filter;
+        filter.context = context_of(i);
+        filter.wanted = wanted, filter.geometry = crowd.stage.geom_id;
+        if (in_context) filter.context.embree.filter = OnlyInstance::filter;
+        EmbreeRayHit ray = crowd.rays[i];
+        EmbreeRay shadow = ray.ray;
+        const bool is_hit = trace_nearest(scene, filter.context.embree, ray);
+        hits += is_hit, asked += filter.asked, refused += !is_hit && filter.asked > 0;
+        EXPECT_TRUE(filter.is_sane);
+        EXPECT_EQ(ray.ray.tnear, 0.0f);
+        EXPECT_TRUE(!is_hit || (ray.hit.primID == wanted && filter.context.hit.instance == wanted));
+        EXPECT_EQ(trace_occlusion(scene, filter.context.embree, shadow), is_hit);
+      }
+    }
+    EXPECT_GT(hits, 50) << in_context;
+    EXPECT_GT(asked, hits) << in_context;
+    EXPECT_GT(refused, 50) << in_context;
   }
 }
 

@@ -44,6 +44,34 @@ TEST(LevelScene, CostIsTheSameWhateverElseIsLoaded) {
   EXPECT_EQ(alone->build_peak_bytes, beside->build_peak_bytes);
 }
 
+TEST(LevelScene, ABuildThatWouldTakeMoreThanItMayStopsThereAndIsForgotten) {
+  const LevelData soup = triangle_soup(30000, 0.02f, 2), other = triangle_soup(3000, 0.02f, 3);
+  const auto device = BvhDevice::create();
+  ASSERT_TRUE(device);
+  BvhDevice& d = **device;
+  const auto beside = LevelScene::build(d, view_of(other));
+  const auto whole = measure_level_scene(d, view_of(soup));
+  ASSERT_TRUE(beside && whole);
+  const uint64_t before = d.bytes();
+  const auto free = LevelScene::build(d, view_of(soup));
+  ASSERT_TRUE(free);
+  const uint64_t enough = free->bytes() + free->build_peak_bytes();
+  for (const double share : {0.0, 0.01, 0.3, 0.6, 0.9, 0.99}) {
+    const uint64_t held = d.bytes();
+    d.reset_peak();
+    const auto most = static_cast<uint64_t>(share * static_cast<double>(enough));
+    const auto scene = LevelScene::build(d, view_of(soup), most);
+    ASSERT_FALSE(scene) << share;
+    EXPECT_EQ(scene.error().code, ErrorCode::OutOfBudget);
+    EXPECT_LE(d.peak_bytes(), held + most) << share;
+    EXPECT_EQ(d.bytes(), held) << share;  // nothing is left of it, in Embree's sum or in ours
+  }
+  const auto again = LevelScene::build(d, view_of(soup), enough);
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->bytes(), free->bytes());
+  EXPECT_GT(d.bytes(), before);
+}
+
 TEST(LevelScene, CostDoesNotDependOnTheNumberOfThreads) {
   const LevelData soup = triangle_soup(30000, 0.02f, 4);
   const auto many = measure_level_scene(view_of(soup));

@@ -6,9 +6,11 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <fstream>
 #include <functional>
 
 #include "base/hash.h"
@@ -89,7 +91,7 @@ TEST(LevelFile, SizesAreKnownBeforeWriting) {
   const auto path = folder.path() / "a.ffl";
   const LevelFileSizes sizes = level_file_sizes(view_of(level));
   EXPECT_EQ(*write_level(path, level), sizes.file_bytes);
-  EXPECT_EQ(sizes.mapped_bytes, (sizes.file_bytes + 4095) / 4096 * 4096);
+  EXPECT_EQ(sizes.memory_bytes, (sizes.file_bytes + 4095) / 4096 * 4096);
   const auto file = LevelFile::open(path, LevelCheck::Full);
   ASSERT_TRUE(file);
   EXPECT_EQ((*file)->build_only_bytes(), sizes.build_only_bytes);
@@ -108,19 +110,79 @@ TEST(LevelFile, MorphMapsAreGivenBackToo) {
   level.morph_face.assign(10000, 0);
   const LevelFileSizes with = level_file_sizes(view_of(level));
   EXPECT_GE(with.build_only_bytes, without.build_only_bytes + 80000 - 2 * 4096);
-  EXPECT_LE(with.build_only_bytes, with.mapped_bytes);
+  EXPECT_LE(with.build_only_bytes, with.memory_bytes);
 }
 
-TEST(LevelFile, ReleasedBuildPagesComeBackUnchanged) {
+TEST(LevelFile, OnlyBuildPagesAreGivenBack) {
   const TemporaryFolder folder;
   const LevelData level = test::random_level(6, 5000, 10);
   const auto path = folder.path() / "a.ffl";
   ASSERT_TRUE(write_level(path, level));
   const auto file = LevelFile::open(path, LevelCheck::Full);
   ASSERT_TRUE(file);
-  const uint64_t before = test::walk((*file)->view());
   (*file)->release_build_pages();
-  EXPECT_EQ(test::walk((*file)->view()), before);
+  const LevelView& view = (*file)->view();
+  size_t kept = 0;
+  for_each_section(view, [&](SectionId id, const auto& array) {
+    const std::span<const std::byte> now = std::as_bytes(array);
+    std::span<const std::byte> before;
+    for_each_section(level, [&](SectionId other, const auto& original) {
+      if (other == id) before = std::as_bytes(std::span(original));
+    });
+    if (id == SectionId::Positions || id == SectionId::Quads) {
+      EXPECT_TRUE(std::ranges::all_of(now.subspan(8192, 4096), [](std::byte b) { return b == std::byte{0}; }));
+    } else if (id != SectionId::MorphVertex && id != SectionId::MorphFace) {
+      EXPECT_TRUE(std::ranges::equal(now, before)) << section_name(id);
+      kept += now.size();
+    }
+  });
+  EXPECT_GT(kept, 0u);
+}
+
+// ---- what happens to a file after it was opened ----
+
+TEST(LevelFile, WhatIsOpenDoesNotChangeWithItsFile) {
+  const TemporaryFolder folder;
+  const LevelData level = test::random_level(6, 5000, 10);
+  const auto path = folder.path() / "a.ffl";
+  const auto open_again = [&] {
+    EXPECT_TRUE(write_level(path, level));
+    return LevelFile::open(path, LevelCheck::Structure);
+  };
+  const auto truncated = open_again();
+  ASSERT_TRUE(truncated);
+  const uint64_t before = test::walk((*truncated)->view());
+  std::filesystem::resize_file(path, 0);
+  EXPECT_EQ(test::walk((*truncated)->view()), before);  // was a SIGBUS while files were mapped
+
+  const auto overwritten = open_again();
+  ASSERT_TRUE(overwritten);
+  std::vector<std::byte> garbage(std::filesystem::file_size(path), std::byte{0xff});
+  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary)
+      .write(reinterpret_cast<const char*>(garbage.data()), static_cast<std::streamsize>(garbage.size()));
+  EXPECT_EQ(test::walk((*overwritten)->view()), before);
+
+  const auto removed = open_again();
+  ASSERT_TRUE(removed);
+  std::filesystem::remove(path);
+  EXPECT_EQ(test::walk((*removed)->view()), before);
+}
+
+TEST(LevelFile, AFileOfAnotherSizeOrContentIsNotTheKnownOne) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "a.ffl";
+  const Result<uint64_t> bytes = write_level(path, test::random_level(6, 50, 10));
+  ASSERT_TRUE(bytes);
+  const uint64_t hash = *hash_level_file(path);
+  EXPECT_TRUE(LevelFile::open_known(path, *bytes, hash));
+  const auto refusal = [&](uint64_t file_bytes, uint64_t file_hash) {
+    const auto file = LevelFile::open_known(path, file_bytes, file_hash);
+    return file ? Error{ErrorCode::Io, "none"} : file.error();
+  };
+  EXPECT_EQ(refusal(*bytes, hash + 1).code, ErrorCode::BadFile);
+  EXPECT_NE(refusal(*bytes + 1, hash).message.find("where its manifest says"), std::string::npos);
+  std::filesystem::resize_file(path, uint64_t{1} << 36);  // sparse: reading it would fill the memory
+  EXPECT_EQ(refusal(*bytes, hash).code, ErrorCode::BadFile);
 }
 
 // ---- the format ----

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "base/random.h"
 #include "tests/support/asset_writer.h"
@@ -92,6 +93,19 @@ TEST(Manifest, ErrorsThatNoiseHidesStayUnknown) {
   EXPECT_NE(bare.error().message.find("color_error_bounds"), std::string::npos) << bare.error().message;
 }
 
+TEST(Manifest, KeepsWhatMorphsTake) {
+  Manifest manifest = sample_manifest();
+  manifest.levels[1].morph = LevelCost{70001, 302};
+  const Result<Manifest> read = manifest_from_json(manifest_to_json(manifest), "test");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_FALSE(read->levels[0].morph);
+  ASSERT_TRUE(read->levels[1].morph);
+  EXPECT_EQ(read->levels[1].morph->resident_bytes, 70001u);
+  EXPECT_EQ(read->levels[1].morph->build_peak_bytes, 302u);
+  manifest.levels[1].morph->resident_bytes = uint64_t{1} << 51;
+  EXPECT_FALSE(manifest_from_json(manifest_to_json(manifest), "test"));
+}
+
 TEST(Manifest, GoldenTextOfVersion1IsFrozen) {
   const Result<Manifest> golden = read_manifest(FARFIELD_TEST_DATA "/format_v1");
   ASSERT_TRUE(golden) << golden.error().message;
@@ -168,6 +182,42 @@ TEST(Manifest, FieldsThatThisVersionDoesNotKnowAreIgnored) {
   json["note"] = {{"by", "someone"}};
   json["levels"][0]["note"] = 1;
   EXPECT_TRUE(manifest_from_json(json.dump(), "test"));
+}
+
+// ---- the checksum ----
+
+TEST(Manifest, WhatIsWrittenHasAChecksumAndOlderTextsHaveNone) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_manifest(folder.path(), sample_manifest()));
+  EXPECT_TRUE(read_manifest(folder.path())->has_checksum);
+  EXPECT_FALSE(read_manifest(FARFIELD_TEST_DATA "/format_v1")->has_checksum);
+  ASSERT_TRUE(write_manifest(folder.path(), *read_manifest(folder.path())));  // as `farfield evaluate` does
+  EXPECT_TRUE(read_manifest(folder.path())->has_checksum);
+}
+
+TEST(HostileManifest, NoChangedByteOfAFileChangesWhatIsRead) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_manifest(folder.path(), sample_manifest()));
+  const auto bytes = test::read_bytes(folder.path() / "manifest.json");
+  const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const std::string sound = manifest_to_json(*manifest_from_json(text, "test"));
+  size_t refused = 0, tried = 0;
+  for (size_t i = 0; i < text.size(); ++i) {
+    for (const char other : {'0', '7', ' ', static_cast<char>(text[i] ^ 1)}) {
+      std::string changed = text;
+      if (std::exchange(changed[i], other) == other) continue;
+      ++tried;
+      const Result<Manifest> read = manifest_from_json(changed, "test");
+      refused += !read;
+      if (read) {
+        EXPECT_EQ(manifest_to_json(*read), sound) << i;
+      }
+    }
+  }
+  EXPECT_EQ(refused, tried - 4 * 8);  // all but those that make "checksum" another word
+  std::string moved = text;
+  moved.replace(moved.find("10000000.0"), 10, "10000001.0");
+  EXPECT_NE(manifest_from_json(moved, "test").error().message.find("its checksum is wrong"), std::string::npos);
 }
 
 // ---- what is wrong with a manifest that is well-formed ----
@@ -292,8 +342,8 @@ TEST(HostileManifest, VersionsAreCheckedFirst) {
 
 TEST(HostileManifest, NumbersThatDoNotFitAreRefused) {
   expect_message(with("/base_resolution", "1e999"), "number overflow");
-  expect_message(with("/base_resolution", "NaN"), "parse error");
-  expect_message(with("/base_resolution", "-Infinity"), "parse error");
+  expect_message(with("/base_resolution", "NaN"), "its JSON is wrong");
+  expect_message(with("/base_resolution", "-Infinity"), "its JSON is wrong");
   expect_message(with("/origin", "[1, 2, 1e400]"), "number overflow");
   expect_message(with("/bounds_upper", "[1, 2, 1e39]"), "not finite");  // fits a double, not a float
   expect_message(with("/hull/0", "[0, 0, -1e300]"), "not finite");

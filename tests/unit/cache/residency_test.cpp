@@ -33,7 +33,7 @@ class ResidencyTest : public testing::Test {
  protected:
   /// An item that takes what it plans.
   ResidencyItem item(uint64_t resident, uint64_t peak, uint64_t number = 1) {
-    return {resident, peak, [=, this]() -> Result<LoadedItem> {
+    return {resident, peak, [=, this](uint64_t) -> Result<LoadedItem> {
               ++loads_;
               return LoadedItem{std::make_unique<Tracked>(number, alive_), resident, peak};
             }};
@@ -46,7 +46,7 @@ class ResidencyTest : public testing::Test {
     return result;
   }
   ResidencyItem broken(const std::string& message) {
-    return {10, 0, [=, this]() -> Result<LoadedItem> {
+    return {10, 0, [=, this](uint64_t) -> Result<LoadedItem> {
               ++loads_;
               return make_error(ErrorCode::BadFile, message);
             }};
@@ -81,9 +81,10 @@ TEST_F(ResidencyTest, CountsResidentBytesAfterAndBuildPeaksDuringLoads) {
   residency.set_other_bytes(100);
   uint64_t during = 0;
   ResidencyItem watched = item(200, 300);
-  watched.load = [&, load = watched.load] {
+  watched.load = [&, load = watched.load](uint64_t left) {
+    EXPECT_EQ(left, 900u);
     during = residency.stats().accounted_bytes;
-    return load();
+    return load(left);
   };
   const size_t a = residency.add(watched);
   const size_t b = residency.add(item(50, 10));
@@ -145,7 +146,7 @@ TEST_F(ResidencyTest, BrokenItemIsTriedOnceReportedOnceAndStaysBroken) {
 TEST_F(ResidencyTest, ExceptionInALoadIsABrokenItem) {
   ResidentSet residency(1000, reports());
   ResidencyItem throwing = item(1, 1);
-  throwing.load = []() -> Result<LoadedItem> { throw std::bad_alloc(); };
+  throwing.load = [](uint64_t) -> Result<LoadedItem> { throw std::bad_alloc(); };
   const size_t a = residency.add(throwing);
   const size_t b = residency.add(item(1, 1));
   EXPECT_EQ(residency.acquire(a), nullptr);
@@ -216,11 +217,11 @@ TEST_F(ResidencyTest, ManyThreadsShareOneLoad) {
   ResidentSet residency(1000);
   std::atomic<int> running{0};
   ResidencyItem slow = item(10, 10, 5);
-  slow.load = [&, load = slow.load] {
+  slow.load = [&, load = slow.load](uint64_t left) {
     EXPECT_EQ(++running, 1);
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     --running;
-    return load();
+    return load(left);
   };
   const size_t a = residency.add(slow);
   std::array<const Resident*, 8> seen{};
@@ -246,13 +247,13 @@ TEST_F(ResidencyTest, StressUnderATinyBudget) {
   });
   for (size_t i = 0; i < kItems; ++i) {
     ResidencyItem tracked = i % 10 == 3 ? broken("bad") : item(10 + i, i % 7, i);
-    tracked.load = [&, load = tracked.load] {
+    tracked.load = [&, load = tracked.load](uint64_t left) {
       EXPECT_EQ(++running, 1);
       std::atomic<uint64_t> sum{0};
       parallel_for(64, 8, [&](size_t begin, size_t end) { sum += end - begin; });
       EXPECT_EQ(sum, 64u);
       --running;
-      return load();
+      return load(left);
     };
     residency.add(tracked);
   }
@@ -305,9 +306,9 @@ TEST_F(ResidencyTest, LoadsThatUseTheThreadsOfTheCallersLoopDoNotDeadlock) {
   ResidentSet residency(1u << 20);
   for (size_t i = 0; i < kItems; ++i) {
     ResidencyItem parallel = item(10, 10, i);
-    parallel.load = [=, load = parallel.load] {
+    parallel.load = [=, load = parallel.load](uint64_t left) {
       parallel_for(64, 1, [&](size_t, size_t) { nap(); });
-      return load();
+      return load(left);
     };
     residency.add(parallel);
   }

@@ -41,6 +41,25 @@ TEST(VerifyAsset, FindsNothingInASoundAsset) {
             manifest.levels[0].file_bytes + manifest.levels[1].file_bytes + manifest.levels[2].file_bytes);
 }
 
+TEST(VerifyAsset, HoldsWhatLevelsTakeAgainstTheManifest) {
+  const TemporaryFolder folder;
+  const Manifest manifest = test::write_sample_asset(folder.path());
+  const auto with_factor = [&](double factor) {
+    return verify_asset(folder.path(), [&, i = size_t{0}](const LevelView&) mutable -> Result<LevelCost> {
+      const LevelEntry& entry = manifest.levels[i++];
+      const auto times = [&](uint64_t bytes) { return static_cast<uint64_t>(factor * static_cast<double>(bytes)); };
+      return LevelCost{times(entry.resident_bytes), times(entry.build_peak_bytes)};
+    });
+  };
+  EXPECT_TRUE(with_factor(1.0).findings.empty()) << text_of(with_factor(1.0));
+  EXPECT_TRUE(with_factor(1.2).is_sound());
+  EXPECT_EQ(with_factor(1.2).findings.size(), 3u);
+  expect_error(with_factor(1.7), "more while it is loaded; the manifest says");
+  expect_error(verify_asset(folder.path(),
+                            [](const LevelView&) -> Result<LevelCost> { return make_error(ErrorCode::Io, "no luck"); }),
+               "it cannot be loaded: no luck");
+}
+
 TEST(VerifyAsset, FindsEveryFigureOfTheManifestThatTheFilesContradict) {
   using Change = std::function<void(Manifest&)>;
   const std::vector<std::pair<std::string, Change>> cases = {

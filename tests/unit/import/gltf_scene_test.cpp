@@ -259,6 +259,21 @@ TEST(GltfScene, AnimationWithBrokenKeysIsRefused) {
   EXPECT_FALSE(spline);
 }
 
+TEST(GltfScene, WhatIsNoGltfIsSaidInWords) {
+  const TemporaryFolder folder;
+  const auto words = [&](const char* content) {
+    const auto scene = read_gltf_scene(folder.write("bad.gltf", content));
+    EXPECT_FALSE(scene) << content;
+    return scene ? "" : scene.error().message;
+  };
+  const std::string no_gltf = "bad.gltf: it is no glTF, neither a JSON object nor binary: give a .gltf or .glb";
+  for (const char* content : {"", " ", "v 0 0 0\nf 1 2 3\n", "ply\n", "[1]", "\x89PNG"})
+    EXPECT_TRUE(words(content).ends_with(no_gltf)) << words(content);
+  EXPECT_NE(words("{\"asset\":\n x}").find("its JSON is wrong at line 2, column 2"), std::string::npos);
+  for (const char* content : {"{", "{\"asset\": {\"version\": \"2.0\"}, }", "{}", "\xef\xbb\xbf{"})
+    EXPECT_EQ(words(content).find("exception"), std::string::npos) << words(content);
+}
+
 TEST(GltfScene, NodeCyclesAndSharedChildrenAreRefused) {
   const TemporaryFolder folder;
   for (const char* nodes : {R"({"children":[1]},{"children":[0]})", R"({"children":[0]})",

@@ -387,5 +387,68 @@ TEST(PlanLevels, SurvivesErrorsTooLargeForADouble) {
   EXPECT_EQ(finest_of(*plan), (std::vector<uint32_t>{2, 2, 2}));
 }
 
+/// The same with morphs of these sizes; the last level has none.
+PlanAsset morphing(PlanAsset asset, const std::vector<uint64_t>& sizes, uint64_t peak = 0) {
+  for (const uint64_t size : sizes) asset.morphs.push_back(MorphSize{size, peak});
+  asset.morphs.emplace_back();
+  return asset;
+}
+
+TEST(Morphs, TakeTheRoomThatIsLeftWhereInstancesSeeABlend) {
+  PlanAsset asset = morphing(asset_of({1000, 100, 10}, 0.5f), {500, 50});
+  const auto plan = plan_levels({&asset, 1}, kUnlimited, 0);
+  ASSERT_TRUE(plan);
+  EXPECT_EQ(plan->usable, (std::vector<std::vector<uint8_t>>{{0, 1, 2}}));
+  EXPECT_EQ(plan->morphs, (std::vector<std::vector<uint8_t>>{{0}}));  // nobody is between 1 and 2
+  EXPECT_EQ(plan->resident_bytes, 1610u);
+  EXPECT_EQ(plan->morphs_given_up, 0u);
+}
+
+TEST(Morphs, AreGivenUpBeforeLevels) {
+  PlanAsset asset = morphing(asset_of({1000, 100, 10}, 0.5f), {500, 50}, 40);
+  for (const uint64_t budget : {1110ul, 1649ul}) {
+    const auto plan = plan_levels({&asset, 1}, budget, 0);
+    ASSERT_TRUE(plan);
+    EXPECT_EQ(plan->finest(0), 0);
+    EXPECT_TRUE(plan->morphs[0].empty()) << budget;
+    EXPECT_EQ(plan->morphs_given_up, 1u) << budget;
+  }
+  const auto plan = plan_levels({&asset, 1}, 1650, 0);
+  ASSERT_TRUE(plan);
+  EXPECT_EQ(plan->morphs[0].size(), 1u);
+  EXPECT_EQ(plan->resident_bytes + plan->build_peak_bytes, 1650u);
+}
+
+TEST(Morphs, AreBetweenNeighboursOnly) {
+  PlanAsset asset = morphing(asset_of({1000, 900, 10}, 0.5f), {1, 1});
+  asset.ray_cost = {10, 11, 5};  // the middle level costs rays more than the finest: it is left out
+  const auto plan = plan_levels({&asset, 1}, kUnlimited, 0);
+  ASSERT_TRUE(plan);
+  ASSERT_EQ(plan->usable, (std::vector<std::vector<uint8_t>>{{0, 2}}));
+  EXPECT_TRUE(plan->morphs[0].empty());
+}
+
+TEST(Morphs, NeverPassTheBudget) {
+  Rng rng(5);
+  for (int round = 0; round < 300; ++round) {
+    std::vector<PlanAsset> assets;
+    for (uint32_t i = 0; i < 1 + rng.next_uint() % 5; ++i) {
+      Asked asked = random_asset(rng);
+      std::vector<uint64_t> sizes;
+      for (size_t k = 1; k < asked.asset.lambda.size(); ++k) sizes.push_back(static_cast<uint64_t>(1e6 * rng.next()));
+      assets.push_back(morphing(std::move(asked.asset), sizes, static_cast<uint64_t>(1e6 * rng.next())));
+    }
+    const auto budget = static_cast<uint64_t>(5e6 * rng.next());
+    const auto plan = plan_levels(assets, budget, 1000);
+    if (!plan) continue;
+    EXPECT_LE(plan->resident_bytes + plan->build_peak_bytes + 1000, budget);
+    for (size_t i = 0; i < assets.size(); ++i) {
+      for (const uint8_t level : plan->morphs[i]) {
+        EXPECT_TRUE(std::ranges::count(plan->usable[i], level) && std::ranges::count(plan->usable[i], level + 1));
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace farfield

@@ -71,8 +71,9 @@ class Shot : public ::testing::Test {
     options_.message = [this](const std::string& line) { messages_ += line + "\n"; };
   }
 
-  /// parent: JSON members of a node that all others become children of; empty: none.
-  void write_scene(const std::string& parent) const {
+  /// parent: JSON members of a node that all others become children of; empty: none. The animation moves node 2, the
+  /// camera, or node 0, a ball, along z from 4 to 200.
+  void write_scene(const std::string& parent, int animated_node = 2) const {
     std::string text = R"({"asset": {"version": "2.0"},
 "buffers": [{"uri": "scene.bin", "byteLength": 68}],
 "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 8},
@@ -85,12 +86,13 @@ class Shot : public ::testing::Test {
 "nodes": [{"mesh": 0}, {"mesh": 0, "translation": [-3, 0, -2]}, {"camera": 0, "name": "camera"},
           {PARENT}],
 "animations": [{"samplers": [{"input": 1, "output": 2}],
-                "channels": [{"sampler": 0, "target": {"node": 2, "path": "translation"}}]}],
+                "channels": [{"sampler": 0, "target": {"node": ANIMATED, "path": "translation"}}]}],
 "scenes": [{"nodes": [ROOTS]}], "scene": 0})";
     const auto fill = [&](const std::string& marker, const std::string& what) {
       text.replace(text.find(marker), marker.size(), what);
     };
     fill("PARENT", parent.empty() ? "" : R"("children": [0, 1, 2], )" + parent);
+    fill("ANIMATED", fmt::format("{}", animated_node));
     fill("ROOTS", parent.empty() ? "0, 1, 2" : "3");
     test::write_text(folder_.path() / "scene.gltf", text);
   }
@@ -238,6 +240,66 @@ TEST_F(Shot, DamagedFrameIsRenderedAgain) {
   }
 }
 
+TEST_F(Shot, ALostPreviewIsMadeAgainAndTheFrameIsKept) {
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  const std::vector<std::byte> preview = test::read_bytes(out() / "frame_0012.png");
+  const auto time = time_of("frame_0012.exr");
+  std::filesystem::remove(out() / "frame_0012.png");
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  EXPECT_EQ(test::read_bytes(out() / "frame_0012.png"), preview);
+  EXPECT_EQ(time_of("frame_0012.exr"), time);
+}
+
+TEST_F(Shot, AnotherFrameUnderAFramesNameIsNoticed) {
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  const std::vector<std::byte> bytes = test::read_bytes(out() / "frame_0012.exr");
+  std::filesystem::copy_file(out() / "frame_0000.exr", out() / "frame_0012.exr",
+                             std::filesystem::copy_options::overwrite_existing);
+  std::vector<std::string> warnings;
+  options_.warning = [&](const std::string& line) { warnings.push_back(line); };
+  ASSERT_TRUE(shoot({0, 12, 12}));
+  EXPECT_EQ(test::read_bytes(out() / "frame_0012.exr"), bytes);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("frame_0012.exr: it is not what this shot has written; it is rendered again"),
+            std::string::npos)
+      << warnings[0];
+}
+
+TEST_F(Shot, LevelsThatAreLostMeanwhileAreSaidMarkedAndRenderedAgain) {
+  options_.width = 480, options_.height = 320, options_.trace.samples_per_pixel = 1;
+  ASSERT_TRUE(shoot({0, 2, 2}));  // bakes
+  const std::vector<std::byte> sound = test::read_bytes(out() / "frame_0002.exr");
+  std::filesystem::remove_all(out());
+
+  const auto level = [&](int k) {
+    return options_.assets / "scene" / "ball.farfield" / fmt::format("level_{}.ffl", k);
+  };
+  std::vector<std::string> warnings;
+  options_.warning = [&](const std::string& line) { warnings.push_back(line); };
+  options_.job.progress = [&](double, const std::string& what) {  // while the frame before is rendered
+    if (what.find("frame 0") != 0) return;
+    for (const int k : {1, 2, 3}) std::filesystem::resize_file(level(k), 100);
+  };
+  const auto report = shoot({0, 2, 2});
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().code, ErrorCode::BadFile);
+  EXPECT_NE(report.error().message.find("1 of 2 frames show coarser levels than planned (frame 2)"), std::string::npos)
+      << report.error().message;
+  ASSERT_FALSE(warnings.empty());
+  EXPECT_NE(warnings[0].find("is left out, a coarser one serves"), std::string::npos) << warnings[0];
+  EXPECT_EQ(record()["frames"][0]["degraded"], false);
+  EXPECT_EQ(record()["frames"][1]["degraded"], true);
+  EXPECT_NE(test::read_bytes(out() / "frame_0002.exr"), sound);
+
+  options_.job = {};
+  const auto first_time = time_of("frame_0000.exr");
+  const auto mended = shoot({0, 2, 2});  // the bake mends the asset first
+  ASSERT_TRUE(mended) << mended.error().message;
+  EXPECT_EQ(time_of("frame_0000.exr"), first_time);
+  EXPECT_EQ(record()["frames"][1]["degraded"], false);
+  EXPECT_EQ(test::read_bytes(out() / "frame_0002.exr"), sound);
+}
+
 TEST_F(Shot, FrameDoesNotDependOnTheFramesBefore) {
   ASSERT_TRUE(shoot({0, 24, 6}));
   ASSERT_TRUE(render_frame(options_, 24, folder_.path() / "alone.exr"));
@@ -334,6 +396,25 @@ TEST_F(Shot, BudgetBelowTheRootsNamesWhatIsNeeded) {
   const auto report = shoot({0, 0, 1});
   ASSERT_FALSE(report);
   EXPECT_EQ(report.error().code, ErrorCode::OutOfBudget);
+  const std::string& message = report.error().message;
+  const size_t bracket = message.rfind('(');
+  ASSERT_NE(bracket, std::string::npos) << message;
+  options_.budget_bytes = std::stoull(message.substr(bracket + 1));
+  EXPECT_TRUE(shoot({0, 0, 1}));
+  --options_.budget_bytes;
+  EXPECT_FALSE(shoot({0, 0, 1}));
+}
+
+TEST_F(Shot, MovingInstancesMakeTheSameFramesAsScenesOpenedForEach) {
+  write_scene("", 0);
+  const auto frame_alone = [&](int frame) {
+    EXPECT_TRUE(render_frame(options_, frame, folder_.path() / "alone.exr"));
+    return test::read_bytes(folder_.path() / "alone.exr");
+  };
+  ASSERT_TRUE(shoot({0, 2, 1}));
+  EXPECT_NE(test::read_bytes(out() / "frame_0001.exr"), test::read_bytes(out() / "frame_0000.exr"));
+  for (const int frame : {0, 1, 2})
+    EXPECT_EQ(frame_alone(frame), test::read_bytes(out() / fmt::format("frame_{:04}.exr", frame)));
 }
 
 TEST_F(Shot, FullDetailShowsLevelZeroOnly) {

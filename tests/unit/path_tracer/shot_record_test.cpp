@@ -35,6 +35,7 @@ ShotRecord sample_record() {
   record.report.peak_accounted_bytes = 70;
   record.report.warnings = {"maple: a texture is missing"};
   record.report.frames = {frame_report(0), frame_report(10)};
+  record.exr_hashes = {{10, 0xfedcba9876543210u}};
   return record;
 }
 
@@ -56,6 +57,9 @@ TEST(ShotRecord, HasTheKeysThatChecksRead) {
   EXPECT_EQ(frame["asked_bytes"], 4321);
   EXPECT_EQ(frame["levels_given_up"]["ground"], 1.5);
   EXPECT_EQ(frame["finest_level"]["ground"], 4);
+  EXPECT_EQ(frame["degraded"], frame["fallbacks"] > 0);
+  EXPECT_EQ(frame["exr_hash"], "fedcba9876543210");
+  EXPECT_FALSE(json["frames"][0].contains("exr_hash"));
 }
 
 TEST(ShotRecord, ComesBackAsItWasWritten) {
@@ -63,6 +67,7 @@ TEST(ShotRecord, ComesBackAsItWasWritten) {
   const auto record = shot_record_from_json(text);
   ASSERT_TRUE(record);
   EXPECT_EQ(to_json(*record), text);
+  EXPECT_EQ(record->exr_hashes, sample_record().exr_hashes);
   EXPECT_EQ(record->fingerprint, sample_record().fingerprint);
 }
 

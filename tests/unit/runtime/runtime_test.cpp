@@ -7,11 +7,14 @@
 #include <chrono>
 #include <fstream>
 #include <limits>
+#include <set>
 #include <thread>
 
 #include "base/parallel.h"
 #include "base/vec.h"
+#include "bvh/level_scene.h"
 #include "cache/manifest.h"
+#include "tests/support/asset_writer.h"
 #include "tests/support/files.h"
 #include "tests/support/level_builder.h"
 #include "tests/support/random_unit.h"
@@ -38,6 +41,7 @@ class RuntimeTest : public ::testing::Test {
     delete folder_;
     folder_ = nullptr;
   }
+  static std::filesystem::path path_of(const std::string& name) { return folder_->path() / name; }
   static std::filesystem::path sphere() { return folder_->path() / "sphere.farfield"; }
   /// A copy that a test may break.
   static std::filesystem::path copy(const char* name) {
@@ -190,6 +194,44 @@ TEST_F(RuntimeTest, AManifestThatPromisesLessThanItsFilesIsRefused) {
   ASSERT_FALSE(asset);
   EXPECT_EQ(asset.error().code, ErrorCode::BadFile);
   EXPECT_NE(asset.error().message.find("level 1"), std::string::npos) << asset.error().message;
+}
+
+TEST_F(RuntimeTest, ALoadNeverTakesMoreThanTheBudgetHoweverTheManifestLies) {
+  const auto liar = copy("small_liar.farfield");
+  Manifest manifest = *read_manifest(liar);
+  LevelEntry& finest = manifest.levels[0];
+  const uint64_t truth = finest.resident_bytes + finest.build_peak_bytes;
+  finest.resident_bytes = finest.file_bytes, finest.build_peak_bytes = 0;
+  ASSERT_TRUE(write_manifest(liar, manifest));
+  ASSERT_GT(truth, finest.file_bytes * 3 / 2);
+  const uint64_t budget = finest.file_bytes + (truth - finest.file_bytes) / 2;
+  Host host(with_budget(budget));
+  host.add(liar);
+  EXPECT_EQ(host.plan(vec3(0, 0, 2)).finest_level[0], 0u) << "the plan believes the manifest";
+  hash_of_hits(host);
+  EXPECT_LE(host.runtime().stats().peak_accounted_bytes, budget);
+  ASSERT_EQ(host.messages.size(), 1u);
+  EXPECT_NE(host.messages[0].find("level_0.ffl: the BVH of"), std::string::npos) << host.messages[0];
+  EXPECT_NE(host.messages[0].find("farfield verify"), std::string::npos) << host.messages[0];
+  EXPECT_GT(host.runtime().stats().fallbacks, 0u);
+}
+
+TEST_F(RuntimeTest, AHullThatWouldCutALevelIsRefused) {
+  const auto cut = copy("cut_hull.farfield");
+  Manifest manifest = *read_manifest(cut);
+  for (int i = 0; i < 8; ++i) manifest.hull.push_back(manifest.bounds.corner(i));
+  ASSERT_TRUE(write_manifest(cut, manifest));
+  {
+    Host host;
+    EXPECT_TRUE(host.runtime().open_asset(cut.string()));
+  }
+  for (vec3& point : manifest.hull) point *= 0.1f;
+  ASSERT_TRUE(write_manifest(cut, manifest));
+  Host host;
+  const auto asset = host.runtime().open_asset(cut.string());
+  ASSERT_FALSE(asset);
+  EXPECT_EQ(asset.error().code, ErrorCode::BadFile);
+  EXPECT_NE(asset.error().message.find("sticks out of the hull"), std::string::npos) << asset.error().message;
 }
 
 TEST_F(RuntimeTest, AssetsCanBeOpenedWhileTheLoaderWorks) {
@@ -457,17 +499,128 @@ TEST_F(RuntimeTest, ALevelThatDidNotFitIsLoadedOnceAPlanHasRoom) {
   EXPECT_EQ(level_seen_at(far), 0u);
 }
 
-TEST_F(RuntimeTest, AFailedPlanLeavesTheFormerOne) {
-  Host host(with_budget(8 << 20));
+/// The number of bytes that an OutOfBudget error says would do: the largest in it.
+uint64_t number_in(const std::string& message) {
+  uint64_t largest = 0;
+  for (size_t i = 0; i < message.size(); ++i) {
+    if (!std::isdigit(message[i])) continue;
+    size_t digits = 0;
+    largest = std::max<uint64_t>(largest, std::stoull(message.substr(i), &digits));
+    i += digits;
+  }
+  return largest;
+}
+
+TEST_F(RuntimeTest, AnInstanceThatDoesNotFitIsRefusedAtOnceWithTheNumberThatWouldDo) {
+  constexpr uint64_t kBudget = 4 << 20;
+  Host host(with_budget(kBudget));
   const AssetId asset = host.add(sphere());
-  host.plan(vec3(0, 0, 300));
-  const uint64_t before = hash_of_hits(host);
-  for (int i = 0; i < 50000; ++i) ASSERT_TRUE(host.runtime().add_instance(asset, mat4x3(1.0f)));
-  host.runtime().set_cameras({{vec3(0, 0, 2), 0.0f, 1e-3f}});
-  const auto plan = host.runtime().plan_frame();
-  ASSERT_FALSE(plan);
-  EXPECT_EQ(plan.error().code, ErrorCode::OutOfBudget);
-  EXPECT_EQ(hash_of_hits(host), before);
+  host.plan(vec3(0, 0, 3));
+  hash_of_hits(host);  // levels are loaded, and have to go
+  uint32_t count = 1;
+  Error error;
+  for (; count < 50000; ++count) {
+    const auto added = host.runtime().add_instance(asset, mat4x3(1.0f));
+    if (!added) {
+      error = added.error();
+      break;
+    }
+    ASSERT_EQ(added->value, count);
+  }
+  EXPECT_EQ(error.code, ErrorCode::OutOfBudget);
+  EXPECT_GT(count, 10000u);
+  EXPECT_LE(host.runtime().stats().peak_accounted_bytes, kBudget);
+  EXPECT_LE(host.plan(vec3(0, 0, 3)).planned_bytes, kBudget);  // what there is works on
+
+  const uint64_t enough = number_in(error.message);
+  EXPECT_EQ(*Runtime::least_budget({sphere().string(), (sphere() / ".").string()}, count + 1), enough);
+  for (const uint64_t budget : {enough, enough - 1}) {
+    Host other(with_budget(budget));
+    other.add(sphere(), std::vector<mat4x3>(count, mat4x3(1.0f)));
+    EXPECT_EQ(other.runtime().add_instance(asset, mat4x3(1.0f)).has_value(), budget == enough);
+  }
+  EXPECT_EQ(Runtime::least_budget({"/nowhere"}, 1).error().code, ErrorCode::NotFound);
+}
+
+// --- Instances that change -------------------------------------------------------------------------------------------
+
+mat4x3 at(const vec3& place, float scale = 1.0f) {
+  mat4x3 m(scale);
+  m[3] = place;
+  return m;
+}
+
+TEST_F(RuntimeTest, MovedHiddenAndRemovedInstancesAreSeenAsIfTheyHadNeverBeenElsewhere) {
+  const std::vector<mat4x3> places = {at({0, 0, 0}), at({0.5f, 0.5f, 0}, 0.4f), at({-0.7f, 0, 0.2f}, 0.5f)};
+  const auto hash = [](Host& host) {
+    host.plan(vec3(0, 0, 25));
+    return hash_of_hits(host, 0.02f);
+  };
+  Host changed;
+  const AssetId asset = changed.add(sphere(), {at({9, 9, 9}), places[1], at({0, 0, -3}, 7.0f)});
+  Runtime& runtime = changed.runtime();
+  hash(changed);
+  ASSERT_TRUE(runtime.move_instance(InstanceId{0}, places[0]));
+  ASSERT_TRUE(runtime.move_instance(InstanceId{2}, places[2]));
+  {
+    Host host;
+    host.add(sphere(), places);
+    EXPECT_EQ(hash(changed), hash(host));
+  }
+  ASSERT_TRUE(runtime.set_visible(InstanceId{1}, false));
+  {
+    Host host;  // ids are part of the hash: the hidden one is out of sight instead
+    host.add(sphere(), {places[0], at({1e6f, 0, 0}, 0.4f), places[2]});
+    EXPECT_EQ(hash(changed), hash(host));
+  }
+  ASSERT_TRUE(runtime.set_visible(InstanceId{1}, true));
+  ASSERT_TRUE(runtime.remove_instance(InstanceId{0}));
+  EXPECT_FALSE(runtime.remove_instance(InstanceId{0}));
+  EXPECT_FALSE(runtime.move_instance(InstanceId{0}, places[0]));
+  EXPECT_FALSE(runtime.set_visible(InstanceId{0}, true));
+  EXPECT_FALSE(runtime.move_instance(InstanceId{3}, places[0]));
+  EXPECT_FALSE(runtime.move_instance(InstanceId{1}, mat4x3(0.0f)));  // it stays where it was
+  {
+    Host host;
+    host.add(sphere(), {at({1e6f, 0, 0}), places[1], places[2]});
+    EXPECT_EQ(hash(changed), hash(host));
+  }
+  const uint64_t bytes = runtime.stats().accounted_bytes;
+  const auto again = runtime.add_instance(asset, places[0], {7, vec3(1.0f)});
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->value, 0u);
+  EXPECT_EQ(runtime.stats().accounted_bytes, bytes + sizeof(InstanceData));  // its data; the record was there
+  {
+    Host host;
+    host.add(sphere(), places);
+    EXPECT_EQ(hash(changed), hash(host));
+  }
+  const uint64_t loads = runtime.stats().levels_loaded;
+  ASSERT_TRUE(runtime.move_instance(InstanceId{1}, places[2]));
+  ASSERT_TRUE(runtime.move_instance(InstanceId{2}, places[1]));
+  hash(changed);
+  EXPECT_EQ(runtime.stats().levels_loaded, loads);  // nothing was built anew
+}
+
+TEST_F(RuntimeTest, PlansFollowWhatMovesComesAndIsHidden) {
+  Host host;
+  const AssetId asset = host.add(sphere(), {at({0, 0, 0}), at({0, 0, -5000})});
+  const auto finest = [&] { return host.plan(vec3(0, 0, 5)).finest_level[0]; };
+  EXPECT_EQ(finest(), 0u);
+  ASSERT_TRUE(host.runtime().set_visible(InstanceId{0}, false));
+  EXPECT_EQ(finest(), 5u);
+  ASSERT_TRUE(host.runtime().move_instance(InstanceId{1}, at({0, 0, -60})));
+  EXPECT_EQ(finest(), 1u);
+  ASSERT_TRUE(host.runtime().add_instance(asset, at({0, 0, 0})));
+  EXPECT_EQ(finest(), 0u);
+  ASSERT_TRUE(host.runtime().remove_instance(InstanceId{2}));
+  for (int i = 0; i < 3000; ++i) ASSERT_TRUE(host.runtime().move_instance(InstanceId{1}, at({0, 0, -5000})));
+  EXPECT_EQ(finest(), 5u);
+  ASSERT_TRUE(host.runtime().remove_instance(InstanceId{1}));
+  finest();
+  RayContext context;
+  EmbreeRayHit hit;
+  EXPECT_FALSE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));  // all are hidden or removed
 }
 
 // --- What rays see ---------------------------------------------------------------------------------------------------
@@ -524,6 +677,69 @@ TEST_F(RuntimeTest, ALevelThatWasReplacedSinceTheAssetWasOpenedIsNotMixedIn) {
   hash_of_hits(host);
   ASSERT_EQ(host.messages.size(), 1u);
   EXPECT_NE(host.messages[0].find("level_1.ffl"), std::string::npos) << host.messages[0];
+}
+
+/// What can happen to a file while a host has its asset open.
+void damage(const std::filesystem::path& file, uint32_t how) {
+  std::error_code ignored;
+  if (how % 3 == 0) std::filesystem::resize_file(file, 100, ignored);
+  if (how % 3 == 1) std::filesystem::remove(file, ignored);
+  if (how % 3 == 2) {
+    const std::string garbage(std::filesystem::file_size(file, ignored), '\xff');
+    std::fstream(file, std::ios::in | std::ios::out | std::ios::binary) << garbage;
+  }
+}
+
+TEST_F(RuntimeTest, WhatIsLoadedStaysAsItWasWhateverHappensToItsFiles) {
+  const auto asset = copy("changed.farfield");
+  Host host;
+  host.add(asset);
+  host.plan(vec3(0, 0, 25));
+  const uint64_t before = hash_of_hits(host, 0.02f);
+  uint32_t how = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(asset)) damage(entry.path(), how++);
+  EXPECT_EQ(hash_of_hits(host, 0.02f), before);
+  host.plan(vec3(0, 0, 25));
+  EXPECT_EQ(hash_of_hits(host, 0.02f), before);
+  EXPECT_TRUE(host.messages.empty()) << host.messages[0];
+}
+
+TEST_F(RuntimeTest, FilesThatAreDamagedWhileRaysFlyCostLevelsAndNothingElse) {
+  const auto distance_of = [](int frame) { return 3.0f * std::exp2f(static_cast<float>(frame * 5 % 8)); };
+  std::vector<uint64_t> sound_frames;
+  {
+    Host host;
+    host.add(sphere());
+    for (int frame = 0; frame < 8; ++frame) {
+      host.plan(vec3(0, 0, distance_of(frame)));
+      sound_frames.push_back(hash_of_hits(host, 0.005f));
+    }
+  }
+  size_t frames_as_they_should_be = 0, frames_with_messages = 0;
+  for (uint32_t trial = 0; trial < 12; ++trial) {
+    const auto asset = copy("damaged.farfield");
+    Host host;
+    host.add(asset);
+    std::thread vandal([&] {
+      for (const uint32_t level : {0u, 1u, 2u, 3u, 5u}) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(trial));
+        damage(asset / ("level_" + std::to_string(level) + ".ffl"), trial + level);
+      }
+    });
+    for (int frame = 0; frame < 8; ++frame) {
+      host.plan(vec3(0, 0, distance_of(frame)));
+      const uint64_t fallbacks = host.runtime().stats().fallbacks;
+      const bool is_as_it_should_be = hash_of_hits(host, 0.005f) == sound_frames[static_cast<size_t>(frame)];
+      const bool was_said = !host.messages.empty() && host.runtime().stats().fallbacks > fallbacks;
+      EXPECT_TRUE(is_as_it_should_be || was_said) << "trial " << trial << ", frame " << frame;
+      frames_as_they_should_be += is_as_it_should_be;
+      frames_with_messages += was_said;
+    }
+    vandal.join();
+    EXPECT_LE(host.messages.size(), 5u);
+  }
+  EXPECT_GT(frames_as_they_should_be, 0u);
+  EXPECT_GT(frames_with_messages, 0u);
 }
 
 TEST_F(RuntimeTest, ProgressiveRaysUseTheRootFirstAndThePlanInTheEnd) {
@@ -603,6 +819,43 @@ TEST_F(RuntimeTest, InteractionsSayWhereAndHow) {
   // From inside, the normal is on the other side.
   ASSERT_TRUE(host.trace({1, 2, 3}, {0, 0.01f, -1}, context, hit));
   EXPECT_NEAR(host.interaction(hit, context).geometric_normal.z, 1.0f, 0.01f);
+}
+
+TEST_F(RuntimeTest, InteractionsSayWhatTheirLightMeets) {
+  const TemporaryFolder folder;
+  std::vector<LevelData> levels = white_sphere();
+  const SymMat3 flat = SymMat3::outer(vec3(0, 0, 1)) + SymMat3::identity() * 0.01f;
+  levels[4] = test::empty_level(5, levels[4].header.resolution);
+  test::set_volume(
+      levels[4], ivec3(1), vec3(-2.56f), [](int, int, int) { return 50.0f; }, [&](int, int, int) { return flat; });
+  set_diffuse(levels[4], vec3(0.25f, 0.5f, 0.75f));
+  write_asset(folder.path() / "a.farfield", levels);
+  const auto at_lambda = [&](float lambda, const mat4x3& place) {
+    Host host(with_lambda(lambda));
+    host.add(folder.path() / "a.farfield", {place});
+    host.plan();
+    RayContext context;
+    EmbreeRayHit hit;
+    EXPECT_TRUE(host.trace({0.1f, 0.2f, 20}, {0, 0, -1}, context, hit));
+    return host.interaction(hit, context);
+  };
+  const Interaction surface = at_lambda(0, mat4x3(1.0f));
+  ASSERT_EQ(surface.kind, Interaction::Kind::Surface);
+  EXPECT_EQ(surface.reflectance.diffuse, vec3(1.0f));
+  EXPECT_EQ(surface.reflectance.specular, vec3(0.0f));
+  EXPECT_EQ(surface.reflectance.sggx[0], 0.0f);
+
+  const mat4x3 turned(vec3(0, 0, 1), vec3(0, 1, 0), vec3(-1, 0, 0), vec3(0.0f));  // z becomes -x
+  for (const bool is_turned : {false, true}) {
+    const Interaction volume = at_lambda(5, is_turned ? turned : mat4x3(1.0f));
+    ASSERT_EQ(volume.kind, Interaction::Kind::Volume);
+    EXPECT_NEAR(volume.reflectance.diffuse.y, 0.5f, 0.01f);
+    EXPECT_EQ(volume.reflectance.self_shadowing, 1.0f);
+    const float* s = volume.reflectance.sggx;
+    EXPECT_NEAR(s[0] + s[1] + s[2], 1.0f, 1e-4f);
+    EXPECT_GT(s[is_turned ? 0 : 2], 0.9f);
+    EXPECT_LT(s[is_turned ? 2 : 0], 0.1f);
+  }
 }
 
 TEST_F(RuntimeTest, HitsThatAreNotOursOrHaveGoneAreBlackAndSaidOnce) {
@@ -743,6 +996,195 @@ TEST_F(RuntimeTest, RaysThatLeaveASurfaceDoNotMeetItAgain) {
     EXPECT_GT(rays, 500);
     EXPECT_EQ(self_hits, 0) << "transform " << i << " size " << size << " at " << far;
   }
+}
+
+// --- Morphs ----------------------------------------------------------------------------------------------------------
+
+/// A sphere of radius 1 that swells by a tenth, then becomes fog: levels 0, 1, 2.
+std::vector<LevelData> swelling_sphere() {
+  std::vector<LevelData> levels = {test::sphere_level(vec3(0), 1.0f, 48, 0, 0.1f),
+                                   test::sphere_level(vec3(0), 1.1f, 48, 1, 0.2f), test::empty_level(2, 0.4f)};
+  for (uint32_t v = 0; v < levels[0].positions.size(); ++v) levels[1].morph_vertex.push_back(v);
+  for (uint32_t f = 0; f < face_count(view_of(levels[0])); ++f) levels[1].morph_face.push_back(f);
+  levels[2].morph_vertex.assign(levels[1].positions.size(), kMorphVoxelized);
+  levels[2].morph_face.assign(face_count(view_of(levels[1])), kMorphVoxelized);
+  test::set_volume(levels[2], ivec3(1), vec3(-1.6f),
+                   [](int x, int y, int z) { return glm::length(vec3(x, y, z) - 3.5f) < 3.0f ? 2.0f : 0.0f; });
+  test::set_diffuse(levels[0], vec3(0.8f, 0.2f, 0.2f));
+  test::set_diffuse(levels[1], vec3(0.2f, 0.2f, 0.8f));
+  test::set_diffuse(levels[2], vec3(0.2f, 0.2f, 0.8f));
+  return levels;
+}
+
+RuntimeOptions morphing(float lambda) {
+  RuntimeOptions options = with_lambda(lambda);
+  options.blend = Blend::Morph;
+  return options;
+}
+
+/// Its asset.
+std::filesystem::path write_swelling_sphere(const std::filesystem::path& folder) {
+  if (!std::filesystem::exists(folder)) write_asset(folder, swelling_sphere());
+  return folder;
+}
+
+TEST_F(RuntimeTest, AMorphLiesBetweenItsLevels) {
+  const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
+  for (const float t : {0.25f, 0.5f, 0.9f}) {
+    Host host(morphing(t));
+    host.add(asset);
+    EXPECT_EQ(host.plan().morphs, 1u);
+    RayContext context;
+    EmbreeRayHit hit;
+    ASSERT_TRUE(host.trace({0.01f, 0.02f, 10}, {0, 0, -1}, context, hit));
+    EXPECT_NEAR(hit.ray.tfar, 9 - 0.1f * t, 3e-3f);  // facets
+    EXPECT_EQ(context.hit.blend, t);
+    const Interaction interaction = host.interaction(hit, context);
+    EXPECT_EQ(interaction.kind, Interaction::Kind::Surface);
+    EXPECT_NEAR(interaction.albedo.x, 0.8f - 0.6f * t, 0.01f);  // colours are bytes
+    EXPECT_NEAR(interaction.albedo.z, 0.2f + 0.6f * t, 0.01f);
+    EXPECT_GT(interaction.shading_normal.z, 0.99f);
+    EXPECT_TRUE(host.messages.empty());
+  }
+}
+
+TEST_F(RuntimeTest, MorphsAreTheLevelsThemselvesAtTheirEnds) {
+  const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
+  for (const float lambda : {0.0f, 1.0f, 2.0f}) {
+    Host still(with_lambda(lambda)), moving(morphing(lambda));
+    for (Host* host : {&still, &moving}) {
+      host->add(asset);
+      host->plan();
+    }
+    EXPECT_EQ(test::hash_of_hits(still), test::hash_of_hits(moving)) << lambda;
+  }
+}
+
+TEST_F(RuntimeTest, AMorphIsTheSameForAnyNumberOfThreadsColdAndWarm) {
+  const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
+  for (const float lambda : {0.5f, 1.5f}) {
+    std::set<uint64_t> hashes;
+    for (const int threads : {1, 2, 16}) {
+      const ThreadLimit limit(threads);
+      Host host(morphing(lambda));
+      host.add(asset);
+      host.plan();
+      hashes.insert(test::hash_of_hits(host));
+      host.runtime().prefetch();
+      hashes.insert(test::hash_of_hits(host));
+      EXPECT_EQ(host.runtime().stats().fallbacks, 0u);
+    }
+    EXPECT_EQ(hashes.size(), 1u) << lambda;
+  }
+}
+
+TEST_F(RuntimeTest, RaysThatLeaveAMorphSeeTheSameOne) {
+  const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
+  Host host(morphing(0.5f));
+  host.add(asset);
+  host.plan();
+  Rng rng(7);
+  int self_hits = 0;
+  for (int k = 0; k < 2000; ++k) {
+    const vec3 direction = test::random_unit(rng);
+    RayContext context;
+    EmbreeRayHit hit;
+    ASSERT_TRUE(host.trace(-4.0f * direction, direction, context, hit));
+    const Interaction interaction = host.interaction(hit, context);
+    vec3 wi = test::random_unit(rng);
+    if (glm::dot(wi, interaction.geometric_normal) < 0.0f) wi = -wi;
+    RayContext next;
+    next.set_origin(context.hit);
+    EXPECT_EQ(next.origin_blend, 0.5f);
+    self_hits += host.trace(interaction.ray_origin(wi), wi, next, hit);
+  }
+  EXPECT_EQ(self_hits, 0);
+}
+
+TEST_F(RuntimeTest, WhereAMorphDoesNotFitItsLevelsDissolve) {
+  const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
+  Host wide(morphing(0.5f));
+  wide.add(asset);
+  const PlanSummary all = wide.plan();
+  EXPECT_EQ(all.morphs, 1u);
+
+  RuntimeOptions options = morphing(0.5f);
+  options.budget_bytes = all.planned_bytes - 1;
+  Host tight(options);
+  tight.add(asset);
+  const PlanSummary less = tight.plan();
+  EXPECT_EQ(less.morphs, 0u);
+  EXPECT_EQ(less.morphs_given_up, 1u);
+  EXPECT_EQ(less.finest_level, all.finest_level);
+  test::hash_of_hits(tight);
+  EXPECT_LE(tight.runtime().stats().peak_accounted_bytes, options.budget_bytes);
+
+  RuntimeOptions dissolving = options;
+  dissolving.blend = Blend::Dissolve;
+  Host plain(dissolving);
+  plain.add(asset);
+  plain.plan();
+  EXPECT_EQ(test::hash_of_hits(plain), test::hash_of_hits(tight));
+
+  RuntimeOptions enough = options;
+  enough.budget_bytes = all.planned_bytes;
+  Host exact(enough);
+  exact.add(asset);
+  EXPECT_EQ(exact.plan().morphs, 1u);
+  EXPECT_EQ(test::hash_of_hits(exact), test::hash_of_hits(wide));
+  EXPECT_LE(exact.runtime().stats().peak_accounted_bytes, enough.budget_bytes);
+  EXPECT_TRUE(exact.messages.empty());
+}
+
+TEST_F(RuntimeTest, LevelsBlendOverTheWindow) {
+  const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
+  for (const auto& [lambda, blend] : {std::pair(0.7f, 0.0f), {0.75f, 0.0f}, {0.875f, 0.5f}}) {
+    RuntimeOptions options = morphing(lambda);
+    options.blend_window = 0.25f;
+    Host host(options);
+    host.add(asset);
+    host.plan();
+    RayContext context;
+    EmbreeRayHit hit;
+    ASSERT_TRUE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));
+    EXPECT_EQ(context.hit.blend, blend) << lambda;
+  }
+  const EmbreeDevice device = std::move(*make_embree_device());
+  for (const float window : {0.0f, -1.0f, 1.5f, std::numeric_limits<float>::quiet_NaN()}) {
+    RuntimeOptions options;
+    options.blend_window = window;
+    EXPECT_FALSE(Runtime::create(device.get(), options)) << window;
+  }
+}
+
+TEST_F(RuntimeTest, AssetsWithoutMeasuredMorphsDissolveAndSaySo) {
+  const std::filesystem::path asset = path_of("old");
+  const auto measure = [](const LevelView& level) { return *measure_level_scene(level); };
+  test::write_asset(asset, swelling_sphere(), measure);
+  Host host(morphing(0.5f));
+  host.add(asset);
+  EXPECT_EQ(host.plan().morphs, 0u);
+  ASSERT_EQ(host.messages.size(), 1u);
+  EXPECT_NE(host.messages[0].find("dissolve"), std::string::npos) << host.messages[0];
+}
+
+TEST_F(RuntimeTest, AFrameInProgressGoesOnWithOneOfTheLevelsUntilTheMorphIsThere) {
+  const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
+  RuntimeOptions options = morphing(0.5f);
+  options.residency = Residency::Progressive;
+  Host host(options);
+  host.add(asset);
+  host.plan();
+  RayContext context;
+  EmbreeRayHit hit;
+  ASSERT_TRUE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));
+  EXPECT_EQ(context.hit.blend, 0.0f);
+  EXPECT_GT(host.runtime().stats().fallbacks, 0u);
+  for (int i = 0; i < 5000 && context.hit.blend == 0.0f; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    host.trace({0, 0, 10}, {0, 0, -1}, context, hit);
+  }
+  EXPECT_EQ(context.hit.blend, 0.5f);
 }
 
 TEST_F(RuntimeTest, ConesWidenWithTheLobe) {
