@@ -14,9 +14,9 @@ namespace farfield {
 
 /// A module as messages and the loader name it.
 struct ModuleName {
-  const char* file;    ///< "farfield_textures.so"
-  const char* entry;   ///< the symbol that it exports; a change of its type takes another name
-  const char* use;     ///< "images cannot be read": what does not work without it
+  const char* file;   ///< "farfield_textures.so"
+  const char* entry;  ///< the symbol that it exports; a change of its type takes another name
+  const char* use;    ///< "images cannot be read": what does not work without it
 };
 
 /// Where modules are looked for: FARFIELD_MODULE_DIR alone if it is set, else the places that the build tree and the

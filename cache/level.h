@@ -52,8 +52,8 @@ struct PackedRadiance {
 PackedRadiance pack_radiance(const vec3& radiance);
 vec3 unpack_radiance(PackedRadiance radiance);
 
-/// Single-scattering albedos, linear RGB in [0, 1], each channel stored as round(255 (2 / pi) asin(sqrt(c))): fine where
-/// nearly all is absorbed and, more so, where nearly nothing is. 0 and 1 are exact, 0.999 is off by 5e-5.
+/// Single-scattering albedos, linear RGB in [0, 1], each channel stored as round(255 (2 / pi) asin(sqrt(c))): fine
+/// where nearly all is absorbed and, more so, where nearly nothing is. 0 and 1 are exact, 0.999 is off by 5e-5.
 struct PackedAlbedo {
   std::array<uint8_t, 3> angle_rgb;
   friend bool operator==(const PackedAlbedo&, const PackedAlbedo&) = default;
@@ -130,7 +130,8 @@ struct LevelHeader {
   float highlight_lean = 0;  ///< of the same, at most kMostHighlightLean (scattering/highlight_lean.h)
   vec3 open_side{0.0f};      ///< of the same, at most kMostOpenSide long (scattering/open_side.h)
   Medium medium = Medium::Flakes;
-  vec3 fog_albedo{0.0f};     ///< single scattering, of fog alone: linear RGB in [0, 1]; where voxels have none of their own
+  vec3 fog_albedo{
+      0.0f};  ///< single scattering, of fog alone: linear RGB in [0, 1]; where voxels have none of their own
   float fog_anisotropy = 0;  ///< g of Henyey and Greenstein, of fog alone: within kMostFogAnisotropy
 };
 

@@ -14,11 +14,11 @@ namespace farfield {
 inline constexpr double kMostAnisotropy = 0.98;
 
 struct FogOptions {
-  std::string density_grid{};  ///< name; empty: "density", or the only fog volume that there is
-  double density_scale = 1;    ///< density 1 of the grid is this attenuation coefficient, in 1 / scene unit; > 0
+  std::string density_grid{};    ///< name; empty: "density", or the only fog volume that there is
+  double density_scale = 1;      ///< density 1 of the grid is this attenuation coefficient, in 1 / scene unit; > 0
   std::optional<vec3> albedo{};  ///< single scattering, linear RGB in [0, 1]; none: the file's, or kDefaultAlbedo
-  double anisotropy = 0;       ///< g, the mean cosine of scattering, within kMostAnisotropy (Henyey-Greenstein)
-  bool level_set = false;      ///< take a level set for the fog inside it; else it is refused
+  double anisotropy = 0;         ///< g, the mean cosine of scattering, within kMostAnisotropy (Henyey-Greenstein)
+  bool level_set = false;        ///< take a level set for the fog inside it; else it is refused
 };
 
 /// Of water droplets in daylight, about: bright, and no path goes on for ever.

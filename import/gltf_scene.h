@@ -101,8 +101,8 @@ struct GltfScene {
   /// Subtracted from all that stands in the world, in double precision: map coordinates leave a float no digits. The
   /// middle of the scene if that lies far from 0 for its size, else 0.
   dvec3 origin_world{0.0};
-  /// All meshes of the file under their numbers, instanced or not, then assemblies, then volumes. Of equal ones only the first is
-  /// instanced.
+  /// All meshes of the file under their numbers, instanced or not, then assemblies, then volumes. Of equal ones only
+  /// the first is instanced.
   std::vector<GltfMesh> meshes;
   /// Of the default scene, in the order of a depth-first walk: all that are to be seen at some time, where they stand
   /// at time 0 or, if their transform is singular then (a plant that grows from nothing), as soon as it is not.

@@ -27,9 +27,10 @@ Result<void> read_property(const tinygltf::Value& extras, const std::string& key
   if (key == "anisotropy" && number) return volume.fog.anisotropy = *number, Result<void>();
   const auto color = extension_vec3(extras, key.c_str());
   if (key == "albedo" && color) return volume.fog.albedo = *color, Result<void>();
-  return bad(fmt::format("\"{}\" is unknown or of the wrong type; file, density_grid, density_scale, albedo, "
-                         "anisotropy and level_set are read",
-                         key));
+  return bad(
+      fmt::format("\"{}\" is unknown or of the wrong type; file, density_grid, density_scale, albedo, "
+                  "anisotropy and level_set are read",
+                  key));
 }
 
 }  // namespace

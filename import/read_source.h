@@ -8,8 +8,8 @@
 #include <optional>
 #include <vector>
 
-#include "import/source_mesh.h"
 #include "import/fog_options.h"
+#include "import/source_mesh.h"
 
 namespace farfield {
 
@@ -40,7 +40,7 @@ class FileHashes {
 struct ImportOptions {
   int mesh =
       -1;  ///< glTF only: import this mesh alone, in its own space; -1: all nodes of the default scene, flattened
-  int node = -1;  ///< glTF only: import all that this node of the file and those below show, in the node's own space
+  int node = -1;     ///< glTF only: import all that this node of the file and those below show, in the node's own space
   FogOptions fog{};  ///< OpenVDB files only: what read_volume() is given
   FileHashes* known_hashes = nullptr;  ///< hashes are looked for there first; null: they read
 };
@@ -51,9 +51,9 @@ struct ImportOptions {
 /// and the remedy. Never crashes on bad files.
 Result<SourceMesh> read_source(const std::filesystem::path& path, const ImportOptions& options = {});
 
-/// The source_hash that read_source(), or of an OpenVDB file read_volume(), would give a source that still refers to `files`: of the bytes of the main file
-/// and of those, or of what a mesh or node takes from a glTF file, and of the options. Does not look at what the bytes
-/// mean. Errors: those of reading the main file; the others may be missing.
+/// The source_hash that read_source(), or of an OpenVDB file read_volume(), would give a source that still refers to
+/// `files`: of the bytes of the main file and of those, or of what a mesh or node takes from a glTF file, and of the
+/// options. Does not look at what the bytes mean. Errors: those of reading the main file; the others may be missing.
 Result<uint64_t> hash_source(const std::filesystem::path& path, const std::vector<HashedFile>& files,
                              const ImportOptions& options);
 

@@ -14,8 +14,8 @@
 
 #include "base/job.h"
 #include "base/result.h"
-#include "import/source_volume.h"
 #include "import/fog_options.h"
+#include "import/source_volume.h"
 
 namespace farfield {
 

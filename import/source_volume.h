@@ -12,8 +12,8 @@
 
 namespace farfield {
 
-inline constexpr int kVolumeBrickSide = 8;          ///< as cache/level.h has it
-inline constexpr int kVolumeBrickVoxels = 512;      ///< x fastest, then y, then z
+inline constexpr int kVolumeBrickSide = 8;      ///< as cache/level.h has it
+inline constexpr int kVolumeBrickVoxels = 512;  ///< x fastest, then y, then z
 inline constexpr uint32_t kEmptyBrick = 0xffffffffu;
 
 /// sigma_t of 8^3 voxels in 1 / scene unit, finite and >= 0.
@@ -22,7 +22,8 @@ using DensityBrick = std::array<float, kVolumeBrickVoxels>;
 using AlbedoBrick = std::array<std::array<uint16_t, 3>, kVolumeBrickVoxels>;
 inline vec3 unpack_albedo(const std::array<uint16_t, 3>& a) { return vec3(a[0], a[1], a[2]) * (1.0f / 65535.0f); }
 
-/// Densities of a sparse grid, in bricks. Voxel (i, j, k) is the cube voxel_size * [i, i + 1] x [j, j + 1] x [k, k + 1].
+/// Densities of a sparse grid, in bricks. Voxel (i, j, k) is the cube voxel_size * [i, i + 1] x [j, j + 1] x [k, k +
+/// 1].
 struct DensityGrid {
   double voxel_size = 0;  ///< > 0, scene units
   ivec3 dims{0};          ///< voxels; the rest of the last bricks is empty
@@ -46,8 +47,8 @@ struct DensityGrid {
 /// Immutable once read; any thread. Bounds are tight: the first and the last voxel along each axis that have a density
 /// are in it. Bricks may be shared by entries of the table (tiles).
 struct SourceVolume : DensityGrid {
-  dvec3 origin{0.0};         ///< lower corner of voxel (0, 0, 0), in the source's space
-  glm::dmat3 rotation{1.0};  ///< columns: the grid's axes in the source's space; orthonormal, may mirror
+  dvec3 origin{0.0};                  ///< lower corner of voxel (0, 0, 0), in the source's space
+  glm::dmat3 rotation{1.0};           ///< columns: the grid's axes in the source's space; orthonormal, may mirror
   std::vector<AlbedoBrick> albedos;   ///< none: `albedo` everywhere. Else as many as bricks
   vec3 albedo{1.0f};                  ///< single scattering, linear RGB in [0, 1]
   float anisotropy = 0;               ///< g of Henyey and Greenstein

@@ -24,8 +24,8 @@ using openvdb::CoordBBox;
 
 constexpr double kCubeTolerance = 1e-4;  ///< of a voxel's edges' lengths, and of the cosines between them
 constexpr double kSmallNegative = 1e-3;  ///< of the largest density: what filters leave behind, not an error
-constexpr uint64_t kMostTableBricks = uint64_t{1} << 26;   ///< the table of a level takes 4 bytes for each
-constexpr uint64_t kMostVoxels = 0xfffffff0ull;            ///< of a level: payload indices have 32 bits
+constexpr uint64_t kMostTableBricks = uint64_t{1} << 26;  ///< the table of a level takes 4 bytes for each
+constexpr uint64_t kMostVoxels = 0xfffffff0ull;           ///< of a level: payload indices have 32 bits
 constexpr std::array<const char*, 6> kEmissionNames = {"temperature", "heat", "flame", "flames", "fire", "emission"};
 constexpr std::array<const char*, 2> kAlbedoNames = {"albedo", "Cd"};
 
@@ -243,13 +243,17 @@ class VdbReader {
     FARFIELD_TRY_LET(const CoordBBox box, check_values(grid));
     FARFIELD_TRY(make_table(grid.getName(), box));
     const Coord corner = box.min();
-    volume_.origin =
-        lattice.to_source(openvdb::Vec3d(corner.x() - 0.5, corner.y() - 0.5, corner.z() - 0.5));
+    volume_.origin = lattice.to_source(openvdb::Vec3d(corner.x() - 0.5, corner.y() - 0.5, corner.z() - 0.5));
     first_voxel_ = corner;
     Result<void> done;
     for_each_active(
-        grid, [&](const CoordBBox& tile, double value) { if (done) done = fill_tile(tile, value); },
-        [&](const auto& leaf) { if (done) done = fill_leaf(leaf); });
+        grid,
+        [&](const CoordBBox& tile, double value) {
+          if (done) done = fill_tile(tile, value);
+        },
+        [&](const auto& leaf) {
+          if (done) done = fill_leaf(leaf);
+        });
     FARFIELD_TRY(std::move(done));
     return count_voxels(grid.getName());
   }
@@ -284,15 +288,17 @@ class VdbReader {
     }
     if (box.empty()) return nothing_in(grid.getName());
     if (smallest < -kSmallNegative * largest) {
-      return error(ErrorCode::BadFile, "the grid \"{}\" has the negative density {} at voxel {}; clean it where it was made",
+      return error(ErrorCode::BadFile,
+                   "the grid \"{}\" has the negative density {} at voxel {}; clean it where it was made",
                    grid.getName(), smallest, coordinate_text(smallest_at));
     }
     if (smallest < 0) {
       warn("the grid \"{}\" has densities below 0, down to {}: taken as 0", grid.getName(), smallest);
     }
     if (!(largest * options_.density_scale <= kDensest)) {
-      return error(ErrorCode::BadFile, "the density {} times the scale {} is more than {}: choose another --density-scale",
-                   largest, options_.density_scale, kDensest);
+      return error(ErrorCode::BadFile,
+                   "the density {} times the scale {} is more than {}: choose another --density-scale", largest,
+                   options_.density_scale, kDensest);
     }
     return box;
   }
@@ -412,7 +418,8 @@ class VdbReader {
     }
     albedo_name_ = header->getName();
     if (header->transform() != density.transform()) {
-      return error(ErrorCode::Unsupported, "the grids \"{}\" and \"{}\" have other transforms; resample one, or give --albedo",
+      return error(ErrorCode::Unsupported,
+                   "the grids \"{}\" and \"{}\" have other transforms; resample one, or give --albedo",
                    density.getName(), albedo_name_);
     }
     const auto grid = openvdb::gridPtrCast<openvdb::Vec3SGrid>(file_.readGrid(albedo_name_));
@@ -433,7 +440,8 @@ class VdbReader {
       for (int i = 0; i < kVolumeBrickVoxels; ++i) {
         const auto voxel = static_cast<size_t>(i);
         if (!(volume_.bricks[index][voxel] > 0)) continue;
-        const Coord at = first_voxel_ + Coord(brick.x * 8 + (i & 7), brick.y * 8 + (i >> 3 & 7), brick.z * 8 + (i >> 6));
+        const Coord at =
+            first_voxel_ + Coord(brick.x * 8 + (i & 7), brick.y * 8 + (i >> 3 & 7), brick.z * 8 + (i >> 6));
         const openvdb::Vec3s value = accessor.getValue(at);
         for (int c = 0; c < 3; ++c) {
           if (!std::isfinite(value[c])) {

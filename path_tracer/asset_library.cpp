@@ -92,7 +92,8 @@ struct ReadyAsset {
 std::optional<ReadyAsset> find_ready(const SceneBakeOptions& bake, const GltfScene& scene, size_t mesh,
                                      FileHashes& hashes) {
   const fs::path folder = asset_folder(bake, scene.meshes[mesh]);
-  if (auto found = find_up_to_date(asset_source(bake, scene.meshes[mesh]), folder, asset_bake_options(bake, scene, mesh, hashes)))
+  if (auto found = find_up_to_date(asset_source(bake, scene.meshes[mesh]), folder,
+                                   asset_bake_options(bake, scene, mesh, hashes)))
     return ReadyAsset{folder, std::move(*found)};
   if (!bake.source_only) return std::nullopt;
   SceneBakeOptions whole = bake;

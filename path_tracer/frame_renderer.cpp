@@ -15,6 +15,7 @@
 #include "base/result.h"
 #include "cache/manifest.h"
 #include "import/read_scene.h"
+#include "import/read_volume.h"
 #include "path_tracer/asset_library.h"
 #include "path_tracer/budget_notice.h"
 #include "path_tracer/film.h"
@@ -155,6 +156,8 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOption
   renderer->options_.warning = [log = renderer->warnings_](const std::string& line) { log->add(line); };
   const RenderOptions& options = renderer->options_;
 
+  if (!is_volume_file(options.scene) && !canonical_text(options.fog).empty())
+    options.warning("flags of volumes are for a volume alone; a scene's nodes say theirs (docs/scene_format.md)");
   FARFIELD_TRY_LET(auto scene, read_scene(options.scene, {options.assemblies, options.fog}));
   for (const std::string& warning : scene.warnings) options.warning(warning);  // before an error may come
   FARFIELD_TRY_LET(const auto camera, find_camera(scene, options.camera));

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "bake/bake.h"
 #include "base/job.h"
 #include "base/result.h"
 #include "farfield/runtime.h"
-#include "bake/bake.h"
 #include "import/gltf_scene.h"
 #include "path_tracer/integrator.h"
 
@@ -38,13 +38,13 @@ struct RenderOptions {
   bool sky = true;                    ///< false: without an environment there is no light but the scene's own
   /// The sun, its sky and the scene's directional lights come from the opposite side: half a turn about +y.
   bool turn_sun = false;
-  float exposure_stops = 0;                          ///< of the PNG previews
-  bool cryptomatte = false;                          ///< also write ids of objects and materials, see film.h
-  uint32_t finest_grid = 512;                        ///< of assets that have to be baked first
-  uint32_t rays_per_voxel = 200;                     ///< the same: SceneBakeOptions::rays_per_voxel
-  AssemblyRule assemblies = AssemblyRule::Repeated;  ///< which subtrees of the scene are baked as one
-  FogOptions fog;                                    ///< of a scene that is a volume alone
-  Downsampling downsampling = Downsampling::Matched;     ///< of volumes that have to be baked
+  float exposure_stops = 0;                           ///< of the PNG previews
+  bool cryptomatte = false;                           ///< also write ids of objects and materials, see film.h
+  uint32_t finest_grid = 512;                         ///< of assets that have to be baked first
+  uint32_t rays_per_voxel = 200;                      ///< the same: SceneBakeOptions::rays_per_voxel
+  AssemblyRule assemblies = AssemblyRule::Repeated;   ///< which subtrees of the scene are baked as one
+  FogOptions fog;                                     ///< of a scene that is a volume alone
+  Downsampling downsampling = Downsampling::Matched;  ///< of volumes that have to be baked
   /// Command that bakes: called as BAKER bake SCENE --scene -o LIBRARY ... Empty: this very program.
   std::filesystem::path baker;
   std::function<void(const std::string& line)> message;  ///< for a person who waits, one line each; may be empty

@@ -40,8 +40,7 @@ Job job_of_asset(const Job& all, const std::string& asset, size_t number, size_t
 
 std::vector<bool> assets_in_use(const GltfScene& scene) {
   std::vector<bool> in_use(scene.meshes.size(), false);
-  for (const GltfInstance& instance : scene.instances)
-    in_use[instance.mesh] = !scene.meshes[instance.mesh].is_empty();
+  for (const GltfInstance& instance : scene.instances) in_use[instance.mesh] = !scene.meshes[instance.mesh].is_empty();
   return in_use;
 }
 

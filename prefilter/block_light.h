@@ -60,7 +60,7 @@ struct BlockLight {
 };
 
 struct BlockRays {
-  uint32_t count = 0;    ///< rounded up to a multiple of 6: the directions along the axes
+  uint32_t count = 0;  ///< rounded up to a multiple of 6: the directions along the axes
   uint64_t seed = 0;
   float anisotropy = 0;  ///< g
 };

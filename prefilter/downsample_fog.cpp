@@ -21,7 +21,7 @@ namespace {
 constexpr double kLeastEffect = 1e-3;
 constexpr double kLeastDifference = 0.01;  ///< of depths, by which a block must differ from its even spread
 constexpr double kMostBackward = 0.9;      ///< g of the other sign: nearly all light goes back
-constexpr double kLeastShare = 1e-3;  ///< of single scattering, and of an axis's attenuation by the largest
+constexpr double kLeastShare = 1e-3;       ///< of single scattering, and of an axis's attenuation by the largest
 constexpr uint32_t kRaysPerArea = 24, kMostRays = 1024;  ///< rays for each fine voxel that a side shows
 
 /// -log of the mean of exp(-depth): finite and exact to a few roundings, however large or small the depths are.
@@ -37,7 +37,7 @@ struct BlockSums {
   dvec3 axis_depth{0.0};  ///< of the block, by what it lets through along x, y, z
   double depth = 0;       ///< sum over all voxels
   double largest = 0, smallest = std::numeric_limits<double>::infinity();  ///< of the voxels that have any
-  dvec3 albedo{0.0};       ///< mean, weighted by density
+  dvec3 albedo{0.0};                                                       ///< mean, weighted by density
   vec3 darkest{1.0f}, brightest{0.0f};
   uint64_t voxels = 0;  ///< with a density
 };
@@ -120,12 +120,10 @@ float share_of_single_scattering(const BlockLight& block, const BlockLight& cube
 }
 
 /// Along an edge of the block, by Transp.
-double mean_depth(const BlockSums& sums) {
-  return (sums.axis_depth.x + sums.axis_depth.y + sums.axis_depth.z) / 3;
-}
+double mean_depth(const BlockSums& sums) { return (sums.axis_depth.x + sums.axis_depth.y + sums.axis_depth.z) / 3; }
 
-/// Whether a block and the cube that stands for it could differ in what they scatter: the cube is thinner than the block
-/// would be if its fog were spread evenly, or fog is so thin that it does not matter.
+/// Whether a block and the cube that stands for it could differ in what they scatter: the cube is thinner than the
+/// block would be if its fog were spread evenly, or fog is so thin that it does not matter.
 bool differs_from_cube(const BlockSums& sums, int side, double depth) {
   if (is_homogeneous(sums, side)) return false;
   const double even_depth = sums.depth / (static_cast<double>(side) * side);
@@ -178,10 +176,11 @@ const char* name_of(Downsampling method) {
 }
 
 Result<Downsampling> parse_downsampling(const std::string& name) {
-  for (const auto method : {Downsampling::Linear, Downsampling::Transp, Downsampling::Iso, Downsampling::Aniso,
-                            Downsampling::Matched})
+  for (const auto method :
+       {Downsampling::Linear, Downsampling::Transp, Downsampling::Iso, Downsampling::Aniso, Downsampling::Matched})
     if (name == name_of(method)) return method;
-  return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is none of linear, transp, iso, aniso, matched", name));
+  return make_error(ErrorCode::InvalidArgument,
+                    fmt::format("\"{}\" is none of linear, transp, iso, aniso, matched", name));
 }
 
 FogDownsampler::FogDownsampler(const SourceVolume& source, uint32_t level, Downsampling method)

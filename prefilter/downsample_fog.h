@@ -41,11 +41,11 @@ inline constexpr uint32_t kFogVersion = 1;
 
 /// A voxel of a level, in full precision.
 struct FogVoxel {
-  float density = 0;  ///< sigma_t in 1 / scene unit, along the axis in which it is largest; 0: empty
-  vec3 albedo{0.0f};  ///< single scattering, linear RGB
-  float self_shadowing = 1;                ///< A in (0, 1]
-  float anisotropy = 0;                    ///< mean cosine of all that the voxel scatters; of Matched
-  SymMat3 shape = SymMat3::identity();     ///< of the attenuation; lambda_max = 1
+  float density = 0;                    ///< sigma_t in 1 / scene unit, along the axis in which it is largest; 0: empty
+  vec3 albedo{0.0f};                    ///< single scattering, linear RGB
+  float self_shadowing = 1;             ///< A in (0, 1]
+  float anisotropy = 0;                 ///< mean cosine of all that the voxel scatters; of Matched
+  SymMat3 shape = SymMat3::identity();  ///< of the attenuation; lambda_max = 1
 };
 
 /// Makes the voxels of one level, k >= 1, from a source that outlives it. Immutable; any thread.

@@ -28,8 +28,8 @@ constexpr double kMostWhole = 0.3;  ///< a step of all densities together change
 constexpr double kFewestLines = 20000, kMostLines = 4e6;
 constexpr uint64_t kSeed = 0x666f67;  // "fog"
 
-/// Calls visit(index of the brick, voxel in it, length) for the voxels of the filled bricks along a ray; all in voxels of
-/// which `side` make one of the grid's along an edge.
+/// Calls visit(index of the brick, voxel in it, length) for the voxels of the filled bricks along a ray; all in voxels
+/// of which `side` make one of the grid's along an edge.
 template <typename Visit>
 void walk_grid(const DensityGrid& grid, int side, const VoxelRay& ray, const Visit& visit) {
   walk_cells(ray, side * kVolumeBrickSide, ivec3(0), grid.brick_dims, [&](const ivec3& at, double enter, double leave) {
@@ -48,7 +48,13 @@ void walk_grid(const DensityGrid& grid, int side, const VoxelRay& ray, const Vis
 class FogMatcher {
  public:
   FogMatcher(const DensityGrid& source, uint32_t k, DensityGrid& level, const Job& job)
-      : source_(source), level_(level), side_(1 << k), job_(job), box_{dvec3(0.0), dvec3(level.dims * side_)}, known_(level.bricks.size() * kVolumeBrickVoxels, 0.0f), local_(level.bricks) {
+      : source_(source),
+        level_(level),
+        side_(1 << k),
+        job_(job),
+        box_{dvec3(0.0), dvec3(level.dims * side_)},
+        known_(level.bricks.size() * kVolumeBrickVoxels, 0.0f),
+        local_(level.bricks) {
     const double in_level_voxels = surface_area(box_) / (side_ * static_cast<double>(side_));
     // Of lines through the box, this share goes through a voxel: the ratio of their surfaces.
     lines_ = static_cast<uint64_t>(std::clamp(kLinesPerVoxel * in_level_voxels / 6, kFewestLines, kMostLines));
@@ -75,7 +81,8 @@ class FogMatcher {
   void visit_depths(const VoxelRay& ray, const Visit& visit) const {
     walk_grid(level_, side_, ray, [&](uint32_t brick, size_t voxel, double length) {
       const float density = level_.bricks[brick][voxel];
-      if (density > 0) visit(brick * kVolumeBrickVoxels + voxel, static_cast<double>(density) * length * source_.voxel_size);
+      if (density > 0)
+        visit(brick * kVolumeBrickVoxels + voxel, static_cast<double>(density) * length * source_.voxel_size);
     });
   }
 
@@ -116,7 +123,8 @@ class FogMatcher {
     for (size_t v = 0; v < sums.size(); ++v) {
       float& density = level_.bricks[v / kVolumeBrickVoxels][v % kVolumeBrickVoxels];
       if (!(density > 0)) continue;
-      const double local = static_cast<double>(local_[v / kVolumeBrickVoxels][v % kVolumeBrickVoxels]) / static_cast<double>(density);
+      const double local =
+          static_cast<double>(local_[v / kVolumeBrickVoxels][v % kVolumeBrickVoxels]) / static_cast<double>(density);
       const double ratio = (sums[v].source.value() + kPrior * local) / (sums[v].medium.value() + kPrior);
       density = static_cast<float>(static_cast<double>(density) * std::clamp(ratio, 1 / kMostMatch, kMostMatch));
       known_[v] = static_cast<float>(sums[v].medium.value() / (sums[v].medium.value() + kPrior));

@@ -10,8 +10,8 @@
 
 namespace farfield {
 
-/// Changes the densities of `level`, whose voxels are 2^k of the source's along each axis and start where those do; none
-/// that is 0. The result does not depend on the number of threads. Errors: Cancelled.
+/// Changes the densities of `level`, whose voxels are 2^k of the source's along each axis and start where those do;
+/// none that is 0. The result does not depend on the number of threads. Errors: Cancelled.
 Result<void> match_fog(const DensityGrid& source, uint32_t k, DensityGrid& level, const Job& job);
 
 }  // namespace farfield

@@ -284,7 +284,7 @@ Interaction make_interaction(const HitLevels& levels, const InstanceRecord& inst
     interaction.kind = Interaction::Kind::Volume;
     const FogParams params = fog_params(view, instance, hit.element);
     interaction.albedo = cluster_albedo(params.albedo, params.self_shadowing);
-    interaction.reflectance.diffuse = params.albedo;
+    interaction.reflectance.fog = params.albedo;
     interaction.reflectance.anisotropy = params.anisotropy;
     interaction.reflectance.self_shadowing = params.self_shadowing;
     InteractionModel::put(interaction, InteractionModel(FogPhase(params, interaction.wo)));

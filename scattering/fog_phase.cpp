@@ -12,9 +12,9 @@
 namespace farfield {
 namespace {
 
-constexpr float kUniform = 0.25f * kInvPi;     ///< density on the whole sphere
-constexpr float kLeastSelfShadowing = 1e-4f;   ///< smaller A is taken as this one: white must not divide 0 by 0
-constexpr float kNoAnisotropy = 1e-3f;         ///< below it the inversion of the cosine loses its digits
+constexpr float kUniform = 0.25f * kInvPi;    ///< density on the whole sphere
+constexpr float kLeastSelfShadowing = 1e-4f;  ///< smaller A is taken as this one: white must not divide 0 by 0
+constexpr float kNoAnisotropy = 1e-3f;        ///< below it the inversion of the cosine loses its digits
 
 /// The cosine between the ways before and after; u uniform in [0, 1).
 float sample_cosine(float g, float u) {

@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 #include "base/process_memory.h"
 #include "base/process_time.h"
+#include "import/read_volume.h"
 #include "path_tracer/scene_assets.h"
 #include "tools/args.h"
 #include "tools/commands.h"
@@ -114,6 +115,20 @@ Result<void> bake_scene(const BakeArguments& arguments) {
                     fmt::format("{}: {} of its assets cannot be baked", arguments.source, *failed));
 }
 
+/// What was said of the other kind of source, which changes nothing.
+std::vector<std::string> flags_without_use(const BakeArguments& arguments) {
+  if (arguments.whole_scene) return {};
+  if (is_volume_file(arguments.source)) {
+    const BakeOptions usual;
+    const BakeOptions& options = arguments.options;
+    if (options.finest_grid == usual.finest_grid && options.rays_per_voxel == usual.rays_per_voxel) return {};
+    return {fmt::format("{}: --finest-grid and --rays-per-voxel are for models; a volume's grid is its own",
+                        arguments.source)};
+  }
+  if (canonical_text(arguments.options.import.fog).empty()) return {};
+  return {fmt::format("{}: is no volume; flags of volumes change nothing", arguments.source)};
+}
+
 Result<void> run_bake(BakeArguments& arguments) {
   if (auto writable = check_can_write(arguments.report, Output::Text, {arguments.source, arguments.output}); !writable)
     return writable;
@@ -121,6 +136,7 @@ Result<void> run_bake(BakeArguments& arguments) {
   arguments.options.job.cancel = &catch_interrupts();
   end_with_parent(arguments.parent);
   if (arguments.whole_scene) return bake_scene(arguments);
+  print_warnings("bake", flags_without_use(arguments));
   ProgressLine progress;
   arguments.options.job.progress = [&](double done, const std::string& stage) { progress.update(done, stage); };
 
@@ -137,15 +153,18 @@ Result<void> run_bake(BakeArguments& arguments) {
 void add_bake_command(CLI::App& app, Action& action) {
   auto arguments = std::make_shared<BakeArguments>();
   BakeOptions& options = arguments->options;
-  CLI::App* command =
-      app.add_subcommand("bake", "Bake a model or a volume to a folder of levels; goes on where an interrupted bake stopped");
-  command->add_option("source", arguments->source, "Model: OBJ, PLY, glTF or glb, gzipped or not. Volume: OpenVDB (.vdb)")
+  CLI::App* command = app.add_subcommand(
+      "bake", "Bake a model or a volume to a folder of levels; goes on where an interrupted bake stopped");
+  command
+      ->add_option("source", arguments->source, "Model: OBJ, PLY, glTF or glb, gzipped or not. Volume: OpenVDB (.vdb)")
       ->required()
       ->check(is_named);
   command->add_option("-o,--output", arguments->output, "Folder to write, by convention NAME.farfield")
       ->required()
       ->check(is_named);
-  command->add_option("--finest-grid", options.finest_grid, "Voxels along the longest side of level 1, a power of two; of models, a volume's grid is its own")
+  command
+      ->add_option("--finest-grid", options.finest_grid,
+                   "Voxels along the longest side of level 1, a power of two; of models, a volume's grid is its own")
       ->capture_default_str();
   command->add_option("--coarsest-grid", options.coarsest_grid, "The same of the last level, the root")
       ->capture_default_str();

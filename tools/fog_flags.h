@@ -12,13 +12,15 @@ namespace farfield::tool {
 inline void add_fog_flags(CLI::App* command, FogOptions& fog) {
   command->add_option("--density-grid", fog.density_grid,
                       "OpenVDB: the grid that is the density. Without it \"density\", or the only fog volume");
-  command->add_option("--density-scale", fog.density_scale,
-                      "OpenVDB: the attenuation coefficient, in 1 / scene unit, where the grid says 1")
+  command
+      ->add_option("--density-scale", fog.density_scale,
+                   "OpenVDB: the attenuation coefficient, in 1 / scene unit, where the grid says 1")
       ->capture_default_str();
   add_parsed_option(command, "--albedo", fog.albedo, parse_albedo,
                     "OpenVDB: single-scattering albedo, grey or r,g,b. Without it the file's, or 0.99");
-  command->add_option("--anisotropy", fog.anisotropy,
-                      "OpenVDB: mean cosine of scattering, above 0 forwards (Henyey-Greenstein)")
+  command
+      ->add_option("--anisotropy", fog.anisotropy,
+                   "OpenVDB: mean cosine of scattering, above 0 forwards (Henyey-Greenstein)")
       ->capture_default_str();
   command->add_flag("--level-set", fog.level_set, "OpenVDB: take a level set for the fog inside it");
 }

@@ -31,7 +31,9 @@ Result<Blend> parse_blend(const std::string& text) {
 
 void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std::string& output_help) {
   RenderOptions& options = arguments.options;
-  command->add_option("scene", arguments.scene, "glTF scene: .glb or .gltf; or an OpenVDB volume: .vdb")->required()->check(is_named);
+  command->add_option("scene", arguments.scene, "glTF scene: .glb or .gltf; or an OpenVDB volume: .vdb")
+      ->required()
+      ->check(is_named);
   command->add_option("-o,--output", arguments.output, output_help)->required()->check(is_named);
   const auto set_size = [&options](const std::string& text) {
     const auto size = parse_pixel_size(text);

@@ -34,9 +34,9 @@ std::string volume_table(const std::string& name, const SourceVolume& volume) {
   text += fmt::format("size {:.4g} x {:.4g} x {:.4g} scene units{}, from ({:.6g}, {:.6g}, {:.6g}), voxels of {:.4g}\n",
                       size.x, size.y, size.z, volume.rotation == glm::dmat3(1.0) ? "" : ", turned", volume.origin.x,
                       volume.origin.y, volume.origin.z, volume.voxel_size);
-  text += fmt::format("attenuation mean {:.4g}, largest {:.4g} per scene unit: {:.3g} and {:.3g} per voxel\n", mean,
-                      volume.densest, mean * volume.voxel_size,
-                      static_cast<double>(volume.densest) * volume.voxel_size);
+  text +=
+      fmt::format("attenuation mean {:.4g}, largest {:.4g} per scene unit: {:.3g} and {:.3g} per voxel\n", mean,
+                  volume.densest, mean * volume.voxel_size, static_cast<double>(volume.densest) * volume.voxel_size);
   if (volume.albedos.empty())
     text += fmt::format("albedo {:.4g}, {:.4g}, {:.4g}", volume.albedo.x, volume.albedo.y, volume.albedo.z);
   else
@@ -47,17 +47,17 @@ std::string volume_table(const std::string& name, const SourceVolume& volume) {
 }
 
 std::string volume_json(const std::string& name, const SourceVolume& volume) {
-  Json json = {{"source", name},
-               {"voxels", volume.active_voxels},
-               {"dims", vector_json(volume.dims)},
-               {"voxel_size", volume.voxel_size},
-               {"origin", vector_json(volume.origin)},
-               {"rotation",
-                {vector_json(volume.rotation[0]), vector_json(volume.rotation[1]), vector_json(volume.rotation[2])}},
-               {"mean_density", mean_density(volume)},
-               {"largest_density", volume.densest},
-               {"anisotropy", volume.anisotropy},
-               {"warnings", volume.warnings}};
+  Json json = {
+      {"source", name},
+      {"voxels", volume.active_voxels},
+      {"dims", vector_json(volume.dims)},
+      {"voxel_size", volume.voxel_size},
+      {"origin", vector_json(volume.origin)},
+      {"rotation", {vector_json(volume.rotation[0]), vector_json(volume.rotation[1]), vector_json(volume.rotation[2])}},
+      {"mean_density", mean_density(volume)},
+      {"largest_density", volume.densest},
+      {"anisotropy", volume.anisotropy},
+      {"warnings", volume.warnings}};
   if (volume.albedos.empty()) json["albedo"] = vector_json(volume.albedo);  // else it varies
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

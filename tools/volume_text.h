@@ -8,7 +8,8 @@
 
 namespace farfield::tool {
 
-/// A few lines: extent, voxels, densities, albedos, and the import's warnings. `name`: the source as the user called it.
+/// A few lines: extent, voxels, densities, albedos, and the import's warnings. `name`: the source as the user called
+/// it.
 std::string volume_table(const std::string& name, const SourceVolume& volume);
 
 /// The same as JSON.

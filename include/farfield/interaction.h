@@ -22,7 +22,7 @@ inline constexpr uint32_t kNoMaterial = 0xffffffffu;
 /// What light meets at a point, as data: for hosts that shade by themselves (spectral ones), and for AOVs. Linear RGB
 /// in [0, 1]. sample() and eval() know more: hot spots, open sides, self-shadowing's colour.
 struct Reflectance {
-  glm::vec3 diffuse{0.0f};       ///< of the light that the highlight leaves, to wo's side; of fog what it scatters once
+  glm::vec3 diffuse{0.0f};       ///< of the light that the highlight leaves, to wo's side
   glm::vec3 specular{0.0f};      ///< F0 of a GGX highlight; 0: there is none
   glm::vec3 transmission{0.0f};  ///< as diffuse, to the other side
   float roughness = 1;           ///< of the highlight, as glTF has it: its square is GGX's alpha. With the spread of
@@ -30,8 +30,10 @@ struct Reflectance {
   /// SGGX matrix xx, yy, zz, xy, xz, yz of the flakes in a volume, or of the normals of a prefiltered face; world
   /// space, trace 1. 0 where a face has but one normal.
   float sggx[6] = {};
-  float self_shadowing = 1;  ///< volumes: the share of light that leaves a collision unmet, in (0, 1]; 1: all
-  float anisotropy = 0;      ///< mean cosine of what fog scatters once; 0 for surfaces and flakes
+  float self_shadowing = 1;  ///< volumes: the share of the light that flakes send on which leaves unmet; 1: all
+  glm::vec3 fog{0.0f};   ///< single-scattering albedo of fog, which has nothing of the above but sggx (0: isotropic)
+                         ///< and self_shadowing; 0 for all else
+  float anisotropy = 0;  ///< of fog: mean cosine of scattering, above 0 forwards
 };
 
 /// Where a ray met an instance and how light scatters there. A value that refers to the Runtime: use it before the next

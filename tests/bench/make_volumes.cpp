@@ -22,7 +22,8 @@ double noise(const dvec3& p) {
   const dvec3 cell = glm::floor(p), f = p - cell, s = f * f * (3.0 - 2.0 * f);
   const auto at = [&](int x, int y, int z) {
     const glm::i64vec3 c = glm::i64vec3(cell) + glm::i64vec3(x, y, z);
-    uint64_t h = static_cast<uint64_t>(c.x) * 0x9e3779b97f4a7c15ull ^ static_cast<uint64_t>(c.y) * 0xbf58476d1ce4e5b9ull ^
+    uint64_t h = static_cast<uint64_t>(c.x) * 0x9e3779b97f4a7c15ull ^
+                 static_cast<uint64_t>(c.y) * 0xbf58476d1ce4e5b9ull ^
                  static_cast<uint64_t>(c.z) * 0x94d049bb133111ebull;
     h ^= h >> 31, h *= 0xd6e8feb86659fd93ull, h ^= h >> 32;
     return static_cast<double>(h >> 11) * 0x1p-53;
@@ -41,7 +42,9 @@ void write(const std::filesystem::path& folder, const char* name, int side,
            const std::function<double(const dvec3&, const ivec3&)>& density) {
   test::VdbGrid grid;
   grid.index_to_source = glm::dmat4(glm::dmat3(8.0 / side));
-  const auto value = [&](const ivec3& v) { return density((dvec3(v) + 0.5) / static_cast<double>(side) * 2.0 - 1.0, v); };
+  const auto value = [&](const ivec3& v) {
+    return density((dvec3(v) + 0.5) / static_cast<double>(side) * 2.0 - 1.0, v);
+  };
   grid.voxels = test::filled_cube(ivec3(-side / 2), side, value);
   const std::filesystem::path path = folder / (std::string(name) + ".vdb");
   test::write_vdb(path, {grid});

@@ -515,9 +515,8 @@ TEST_F(WholeRoad, RenderAndShotOfAScene) {
 void write_fog_ball(const fs::path& path) {
   test::VdbGrid grid;
   grid.index_to_source = glm::dmat4(glm::dmat3(0.125));
-  grid.voxels = test::filled_cube({-8, -8, -8}, 17, [](const ivec3& v) {
-    return std::max(0.0, 8 - glm::length(dvec3(v) - 8.0));
-  });
+  grid.voxels = test::filled_cube({-8, -8, -8}, 17,
+                                  [](const ivec3& v) { return std::max(0.0, 8 - glm::length(dvec3(v) - 8.0)); });
   test::write_vdb(path, {grid});
 }
 
@@ -553,8 +552,8 @@ TEST_F(WholeRoad, AVolumeStandsInASceneOfMeshes) {
                             {"extras", {{"farfield_volume", {{"file", "ball.vdb"}, {"albedo", {1, 0.2, 0.2}}}}}}});
   scene["scenes"][0]["nodes"].push_back(scene["nodes"].size() - 1);
   std::ofstream(path("foggy.gltf")) << scene;
-  const std::vector<std::string> common = {"--finest-grid", "16", "--size", "48x32", "--spp", "8", "--assets",
-                                           path("foggy_assets")};
+  const std::vector<std::string> common = {"--finest-grid", "16", "--size",   "48x32",
+                                           "--spp",         "8",  "--assets", path("foggy_assets")};
   const auto render = [&](const std::string& file, const std::string& out) {
     std::vector<std::string> arguments = {"render", path(file), "-o", path(out)};
     arguments.insert(arguments.end(), common.begin(), common.end());

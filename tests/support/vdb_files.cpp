@@ -77,7 +77,8 @@ void write_frustum_vdb(const std::filesystem::path& path) {
   openvdb::io::File(path.string()).write({grid});
 }
 
-std::vector<double> march_vdb(const std::filesystem::path& path, std::span<const VdbRay> rays, double scale, int steps) {
+std::vector<double> march_vdb(const std::filesystem::path& path, std::span<const VdbRay> rays, double scale,
+                              int steps) {
   openvdb::initialize();
   openvdb::io::File file(path.string());
   file.open(false);

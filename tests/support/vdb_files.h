@@ -45,7 +45,8 @@ struct VdbRay {
   dvec3 origin{0.0}, direction{0.0, 0.0, 1.0};  ///< in the source's space; unit
   double length = 1;
 };
-/// exp(-scale times the integral of the grid "density") by midpoints of `steps`, with OpenVDB's sampler of nearest voxels.
+/// exp(-scale times the integral of the grid "density") by midpoints of `steps`, with OpenVDB's sampler of nearest
+/// voxels.
 std::vector<double> march_vdb(const std::filesystem::path& path, std::span<const VdbRay> rays, double scale, int steps);
 
 }  // namespace farfield::test

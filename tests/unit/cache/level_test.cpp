@@ -106,7 +106,8 @@ TEST(PackedAlbedo, IsFineAtBothEnds) {
 }
 
 TEST(PackedAnisotropy, IsWithinItsStepAndItsBounds) {
-  for (const float g : {-0.98f, -0.3f, 0.0f, 0.004f, 0.85f}) EXPECT_NEAR(unpack_anisotropy(pack_anisotropy(g)), g, 0.5f / 127);
+  for (const float g : {-0.98f, -0.3f, 0.0f, 0.004f, 0.85f})
+    EXPECT_NEAR(unpack_anisotropy(pack_anisotropy(g)), g, 0.5f / 127);
   EXPECT_EQ(pack_anisotropy(NAN), 0);
   EXPECT_LE(unpack_anisotropy(pack_anisotropy(5)), 0.98f);
 }

@@ -26,9 +26,10 @@ class GltfVolumes : public testing::Test {
   }
   GltfScene read(const std::string& nodes) const {
     const fs::path path = folder_.write(
-        "scene.glb", test::glb(R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}], "nodes": [)" +
-                                   nodes + "]}",
-                               ""));
+        "scene.glb",
+        test::glb(
+            R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}], "nodes": [)" + nodes + "]}",
+            ""));
     const auto scene = read_scene(path);
     EXPECT_TRUE(scene) << scene.error().message;
     return scene.value_or(GltfScene());
@@ -68,12 +69,13 @@ TEST_F(GltfVolumes, PropertiesAreReadAndMakeAnotherAsset) {
 }
 
 TEST_F(GltfVolumes, WhatCannotBeReadIsLeftOutAndSaid) {
-  for (const auto& [extras, words] : {std::pair(R"("none.vdb")", "no such file"), std::pair(R"("")", "names no file"),
-                                      std::pair(R"("/etc/cloud.vdb")", "relative"),
-                                      std::pair(R"({"file": "clouds/cloud.vdb", "colour": 1})", "\"colour\" is unknown"),
-                                      std::pair(R"({"file": "clouds/cloud.vdb", "albedo": 1})", "\"albedo\""),
-                                      std::pair(R"({"file": "clouds/cloud.vdb", "density_scale": -1})", "density-scale"),
-                                      std::pair("7", "names no file")}) {
+  for (const auto& [extras, words] :
+       {std::pair(R"("none.vdb")", "no such file"), std::pair(R"("")", "names no file"),
+        std::pair(R"("/etc/cloud.vdb")", "relative"),
+        std::pair(R"({"file": "clouds/cloud.vdb", "colour": 1})", "\"colour\" is unknown"),
+        std::pair(R"({"file": "clouds/cloud.vdb", "albedo": 1})", "\"albedo\""),
+        std::pair(R"({"file": "clouds/cloud.vdb", "density_scale": -1})", "density-scale"),
+        std::pair("7", "names no file")}) {
     const GltfScene scene = read(std::string(R"({"extras": {"farfield_volume": )") + extras + R"(}}, {})");
     EXPECT_TRUE(scene.instances.empty()) << extras;
     ASSERT_EQ(scene.warnings.size(), 1u) << extras;

@@ -144,7 +144,8 @@ TEST_F(ReadVolume, TheDensityIsFoundByNameOrBecauseThereIsNoOther) {
   other.name = "dust";
   const fs::path two = write({smoke, other});
   const std::string message = failure(two, ErrorCode::Unsupported);
-  for (const char* words : {"several float grids", "--density-grid", "\"smoke\" (float)", "\"dust\" (float)", "cloud.vdb"})
+  for (const char* words :
+       {"several float grids", "--density-grid", "\"smoke\" (float)", "\"dust\" (float)", "cloud.vdb"})
     EXPECT_NE(message.find(words), std::string::npos) << message;
   EXPECT_EQ(read(two, {.density_grid = "dust"}).densest, 5.0f);
   EXPECT_NE(failure(two, ErrorCode::Unsupported, {.density_grid = "fog"}).find("there is no grid \"fog\""),

@@ -15,7 +15,8 @@ namespace {
 
 using test::make_volume;
 
-constexpr Downsampling kMethods[] = {Downsampling::Linear, Downsampling::Transp, Downsampling::Iso, Downsampling::Aniso};
+constexpr Downsampling kMethods[] = {Downsampling::Linear, Downsampling::Transp, Downsampling::Iso,
+                                     Downsampling::Aniso};
 
 TEST(DownsampleFog, HomogeneousBlocksAreExact) {
   for (const float g : {0.0f, 0.7f}) {
@@ -89,7 +90,8 @@ TEST(DownsampleFog, ExtremesStayFinite) {
 
 /// Of a block as one path tracer sees it: grey fog in clumps.
 SourceVolume clumps(float albedo) {
-  SourceVolume volume = make_volume(ivec3(8), 1, [](const ivec3& v) { return (v.x / 2 + v.y / 2 + v.z / 2) % 2 ? 4 : 0; });
+  SourceVolume volume =
+      make_volume(ivec3(8), 1, [](const ivec3& v) { return (v.x / 2 + v.y / 2 + v.z / 2) % 2 ? 4 : 0; });
   volume.albedo = vec3(albedo);
   return volume;
 }
@@ -99,7 +101,8 @@ TEST(DownsampleFog, ClumpsAreDarkerThanTheFogTheyAreMadeOf) {
   const FogVoxel voxel = FogDownsampler(volume, 3, Downsampling::Iso).voxel({0, 0, 0});
   EXPECT_LT(voxel.self_shadowing, 0.9f);
   const float albedo = cluster_albedo(vec3(0.9f), voxel.self_shadowing).x;
-  // The cube with that albedo is as bright as the block is, up to the noise of 1024 rays: their albedos differ by less than 2 %.
+  // The cube with that albedo is as bright as the block is, up to the noise of 1024 rays: their albedos differ by less
+  // than 2 %.
   const BlockRays rays{30000, 7, 0};
   const BlockLight block = follow_light(FogBlock(volume, ivec3(0), 8), rays);
   const BlockLight cube = follow_light(FogCube{static_cast<double>(voxel.density) * 8, 8, vec3(albedo)}, rays);

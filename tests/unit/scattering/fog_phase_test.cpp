@@ -37,13 +37,13 @@ TEST(FogPhase, SendsOutWhatItsAlbedoSays) {
     const FogPhase phase(fog, vec3(0.6f, 0, 0.8f));
     const vec3 albedo = cluster_albedo(fog.albedo, fog.self_shadowing);
     for (int c = 0; c < 3; ++c) {
-      const double out = integrate_sphere_graded(
-          [&](const dvec3& wi) { return double(phase.eval(vec3(wi), rng)[c]); }, 64, {0.6, 0, 0.8});
+      const double out = integrate_sphere_graded([&](const dvec3& wi) { return double(phase.eval(vec3(wi), rng)[c]); },
+                                                 64, {0.6, 0, 0.8});
       EXPECT_NEAR(out, double(albedo[c]), 2e-4) << name(fog);
     }
-    EXPECT_NEAR(integrate_sphere_graded([&](const dvec3& wi) { return double(phase.pdf(vec3(wi))); }, 64,
-                                        {0.6, 0, 0.8}),
-                1, 2e-4)
+    EXPECT_NEAR(
+        integrate_sphere_graded([&](const dvec3& wi) { return double(phase.pdf(vec3(wi))); }, 64, {0.6, 0, 0.8}), 1,
+        2e-4)
         << name(fog);
   }
 }
