@@ -76,7 +76,8 @@ bool is_in_range(const glm::dmat3& m) { return is_in_range(m[0]) && is_in_range(
 // --- Instances -------------------------------------------------------------------------------------------------------
 
 vec3 InstanceRecord::normal_to_world(const vec3& n) const {
-  return static_cast<float>(handedness) * (n.x * vec3(world_to_local[0]) + n.y * vec3(world_to_local[1]) + n.z * vec3(world_to_local[2]));
+  return static_cast<float>(handedness) *
+         (n.x * vec3(world_to_local[0]) + n.y * vec3(world_to_local[1]) + n.z * vec3(world_to_local[2]));
 }
 
 mat3 InstanceRecord::linear_to_local() const {
@@ -227,7 +228,8 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
   }
   made.instance = instance;
   const InstanceRecord& hit_instance = instances[instance];
-  made.lambda = lambda_of_choice(*assets[hit_instance.asset], hit_instance.footprint, hit_instance.limits, visit.choice, forced_lambda);
+  made.lambda = lambda_of_choice(*assets[hit_instance.asset], hit_instance.footprint, hit_instance.limits, visit.choice,
+                                 forced_lambda);
   vec3 normal_world(0.0f);
   if (made.is_volume) {
     hit.u = hit.v = 0.0f;

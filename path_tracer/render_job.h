@@ -29,7 +29,7 @@ struct RenderOptions {
   uint64_t budget_bytes = uint64_t{4} << 30;
   /// Folder of baked assets: ASSETS/SCENE/MESH.farfield for each mesh. Empty: "farfield-assets" beside the scene.
   std::filesystem::path assets;
-  float pixel_error = 1.0f;  ///< RuntimeOptions::pixel_error
+  float pixel_error = 1.0f;       ///< RuntimeOptions::pixel_error
   float off_screen_scale = 1.0f;  ///< TessellationCamera::off_screen_scale
   Blend blend = Blend::Dissolve;
   float blend_window = 1.0f;          ///< RuntimeOptions::blend_window
