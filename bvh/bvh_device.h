@@ -55,6 +55,9 @@ class BvhDevice {
   EmbreeDevice device_;  // last, so released first: what it gives back is still counted
 };
 
+/// As much memory as there is.
+inline constexpr uint64_t kAnyBytes = std::numeric_limits<uint64_t>::max();
+
 /// What Embree does not report: scene objects, geometry objects and malloc's rounding, measured on 3.13.5.
 inline constexpr uint64_t kSceneOverheadBytes = 3072;
 inline constexpr uint64_t kGeometryOverheadBytes = 300;

@@ -113,7 +113,7 @@ Result<LoadedItem> load_morph(const OpenAsset& asset, uint32_t slot, BvhDevice& 
   FARFIELD_TRY_LET(loaded->traced, TracedMorph::build(device, fine->view(), coarse->view(),
                                                       *asset.traced.loaded[slot].load(std::memory_order_acquire),
                                                       *asset.traced.loaded[slot + 1].load(std::memory_order_acquire),
-                                                      bytes_left - std::min(bytes_left, files)));
+                                                      bytes_left - file_bytes));
   const LevelCost cost = loaded->traced->cost(fine->view(), coarse->view());
   return LoadedItem{std::move(loaded), cost.resident_bytes, cost.build_peak_bytes};
 }
