@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <initializer_list>
 
 namespace farfield {
 

@@ -88,7 +88,7 @@ class FARFIELD_API Interaction {
   /// the half vector or, through a surface or a flake, going straight on, and widened as cones are.
   RayDifferential next_differential(const ScatterSample& sample, const RayDifferential& incoming, float t) const;
   /// Makes the context that of the ray from ray_origin(sample.wi) towards sample.wi: where it starts, the level that it
-  /// keeps there, its cone or differential. context: as rtcIntersect1 left it, t: tfar of that ray. The host still
+  /// keeps there, its cone or differential. context: as the query left it, t: tfar of that ray. The host still
   /// gives it a new ray_seed.
   void spawn(const ScatterSample& sample, float t, RayContext& context) const;
 

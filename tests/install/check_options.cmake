@@ -3,8 +3,8 @@
 # without it: those packages are made unfindable, so that looking for one of them as REQUIRED stops the configuration.
 include(${CMAKE_CURRENT_LIST_DIR}/run.cmake)
 
-set(bake_packages ZLIB TinyGLTF)
-set(tool_packages Imath OpenEXR CLI11)
+set(bake_packages ZLIB TinyGLTF Imath)
+set(tool_packages OpenEXR CLI11)
 set(test_packages GTest benchmark)
 
 # configure_with(BAKE TOOLS SAMPLES HIDDEN...): sets `command` to configure these parts, ON or OFF each, without tests and

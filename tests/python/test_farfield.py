@@ -225,7 +225,7 @@ class Materials(InAFolder):
         report = farfield.bake(mesh, other, materials=lambda query: {"diffuse": (0.5, 0.25, 0.125)}, **SMALL)
         root = report["levels"][-1]["level"]
         self.assertGreater(root, 0)
-        described, asked = (self.front(asset, level=root) for asset in (self.out, other))
+        described, asked = (self.front(asset, level=root, samples=1024) for asset in (self.out, other))
         np.testing.assert_allclose(asked.mean((0, 1)), described.mean((0, 1)), rtol=0.01)
 
     def test_a_batched_function_bakes_what_it_bakes_one_by_one(self):
