@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "base/free_memory.h"
+#include "bake/pack_arrays.h"
 #include "base/parallel.h"
 #include "scattering/sggx_codec.h"
 
@@ -37,11 +37,7 @@ void pack_densities(const FogVoxels& voxels, Brick& brick) {
     brick.density[i] = static_cast<uint8_t>(step);
     if (brick.density[i] != 0) brick.mask[i >> 6] |= uint64_t{1} << (i & 63);
   }
-  uint32_t count = 0;
-  for (size_t word = 0; word < brick.mask.size(); ++word) {
-    brick.prefix[word] = static_cast<uint16_t>(count);
-    count += static_cast<uint32_t>(__builtin_popcountll(brick.mask[word]));
-  }
+  sum_up_mask(brick);
 }
 
 PackedFog pack_brick(const FogVoxels& voxels) {
@@ -60,11 +56,6 @@ PackedFog pack_brick(const FogVoxels& voxels) {
 template <typename T>
 void append(std::vector<T>& all, const std::vector<T>& more) {
   all.insert(all.end(), more.begin(), more.end());
-}
-
-template <typename T>
-void drop_if_all(std::vector<T>& values, const T& default_value) {
-  if (std::ranges::all_of(values, [&](const T& v) { return v == default_value; })) free_memory(values);
 }
 
 /// Which channels a level's voxels may have at all.

@@ -7,9 +7,9 @@
 #include <optional>
 #include <type_traits>
 
+#include "bake/pack_arrays.h"
 #include "bake/pack_colors.h"
 #include "base/check.h"
-#include "base/free_memory.h"
 #include "base/index.h"
 #include "base/parallel.h"
 #include "prefilter/edge_table.h"
@@ -183,11 +183,6 @@ void sort_along_curve(const Surface& surface, std::vector<Pair>& pairs) {
 // ---------------------------------------------------------------------------------------------------------------
 // Channels. A channel is packed, and left out when all of it is the default.
 
-template <typename T>
-void drop_if_all(std::vector<T>& values, const T& default_value) {
-  if (std::all_of(values.begin(), values.end(), [&](const T& v) { return v == default_value; })) free_memory(values);
-}
-
 template <typename Packed, typename Source, typename Pack>
 std::vector<Packed> pack_each(const std::vector<Source>& source, const Pack& pack) {
   std::vector<Packed> packed(source.size());
@@ -265,11 +260,7 @@ Brick pack_brick(const SparseVolume& volume, const VoxelBrick& source) {
   Brick brick{};
   brick.mask = source.mask;
   brick.payload_base = static_cast<uint32_t>(source.first_voxel);
-  uint32_t count = 0;
-  for (size_t word = 0; word < brick.mask.size(); ++word) {
-    brick.prefix[word] = static_cast<uint16_t>(count);
-    count += static_cast<uint32_t>(__builtin_popcountll(brick.mask[word]));
-  }
+  const uint32_t count = sum_up_mask(brick);
   const Voxel* voxels = &volume.voxels[source.first_voxel];
   for (uint32_t i = 0; i < count; ++i) brick.density_scale = std::max(brick.density_scale, voxels[i].density);
   for (int i = 0; i < kBrickVoxels; ++i) {

@@ -375,7 +375,7 @@ bool InstanceGeometry::intersect_filtered(const Query& query, EmbreeRayHit& ray_
   const std::optional<HitRecord> record_before = record ? std::optional(*record) : std::nullopt;
   const uint32_t ray_seed = context.ray_seed;
   bool is_accepted = false;
-  while (!is_accepted && intersect_once()) {
+  while (intersect_once()) {
     is_accepted = query.does_host_accept(ray_hit);
     if (is_accepted) break;
     const float behind = std::nextafter(ray_hit.ray.tfar, kInfinity);

@@ -324,7 +324,7 @@ vec3 Interaction::ray_origin(const vec3& wi) const {
 ScatterSample Interaction::sample(Rng& rng) const {
   if (kind == Kind::None) return {};
   const InteractionModel& model = InteractionModel::of(*this);
-  if (kind == Kind::Volume) return model.is_fog ? model.fog.sample(rng) : model.flakes.sample(rng);
+  if (kind == Kind::Volume) return model.with_phase([&](const auto& phase) { return phase.sample(rng); });
   const HorizonLobe& horizon = model.horizon;
   if (!(horizon.chance > 0)) return model.surface.sample(rng);
   ScatterSample sample;
@@ -343,7 +343,7 @@ ScatterSample Interaction::sample(Rng& rng) const {
 glm::vec3 Interaction::eval(const glm::vec3& wi, Rng& rng) const {
   if (kind == Kind::None) return vec3(0.0f);
   const InteractionModel& model = InteractionModel::of(*this);
-  if (kind == Kind::Volume) return model.is_fog ? model.fog.eval(wi, rng) : model.flakes.eval(wi, rng);
+  if (kind == Kind::Volume) return model.with_phase([&](const auto& phase) { return phase.eval(wi, rng); });
   const vec3 value = is_on_one_side(*this, wi) ? model.surface.eval(wi) : vec3(0.0f);
   return model.horizon.chance > 0 ? value + model.horizon.eval(wi) : value;
 }
@@ -351,7 +351,7 @@ glm::vec3 Interaction::eval(const glm::vec3& wi, Rng& rng) const {
 float Interaction::pdf(const glm::vec3& wi) const {
   if (kind == Kind::None) return 0.0f;
   const InteractionModel& model = InteractionModel::of(*this);
-  if (kind == Kind::Volume) return model.is_fog ? model.fog.pdf(wi) : model.flakes.pdf(wi);
+  if (kind == Kind::Volume) return model.with_phase([&](const auto& phase) { return phase.pdf(wi); });
   const float chance = model.horizon.chance;
   const float density = (1 - chance) * model.surface.pdf(wi);
   return chance > 0 ? density + chance * model.horizon.pdf(wi) : density;

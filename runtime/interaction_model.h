@@ -45,6 +45,12 @@ struct InteractionModel {
   explicit InteractionModel(const FlakePhase& phase) : flakes(phase) {}
   explicit InteractionModel(const FogPhase& phase) : fog(phase), is_fog(true) {}
 
+  /// Of Kind::Volume: use(its phase function).
+  template <typename Use>
+  auto with_phase(const Use& use) const {
+    return is_fog ? use(fog) : use(flakes);
+  }
+
   static const InteractionModel& of(const Interaction& interaction);
   static void put(Interaction& interaction, const InteractionModel& model);
 };
