@@ -44,14 +44,16 @@ const TracedLevel* LevelStore::serve(uint32_t asset_index, uint32_t slot) {
 }
 
 const TracedMorph* LevelStore::serve_morph(uint32_t asset_index, uint32_t slot) {
-  OpenAsset& asset = *assets_[asset_index];
+  const TracedMorph* morph = find_morph(*assets_[asset_index], slot);
+  if (!morph) fallbacks_.fetch_add(1, std::memory_order_relaxed);
+  return morph;
+}
+
+const TracedMorph* LevelStore::find_morph(OpenAsset& asset, uint32_t slot) {
   bool may_ask = true;
   const bool has_levels = find_level(asset, slot + 1, may_ask) && find_level(asset, slot, may_ask);
   const Resident* resident = has_levels ? find(asset.morph_items[slot], may_ask) : nullptr;
-  if (!resident) {
-    fallbacks_.fetch_add(1, std::memory_order_relaxed);
-    return nullptr;
-  }
+  if (!resident) return nullptr;
   const TracedMorph* morph = static_cast<const LoadedMorph*>(resident)->traced.get();
   asset.traced.morphs[slot].store(morph, std::memory_order_release);
   return morph;
@@ -248,7 +250,7 @@ void LevelStore::load(uint32_t asset, uint32_t slot) {
   }
 }
 
-void LevelStore::load_morph(uint32_t asset, uint32_t slot) { serve_morph(asset, slot); }
+void LevelStore::load_morph(uint32_t asset, uint32_t slot) { find_morph(*assets_[asset], slot); }
 
 uint64_t LevelStore::fixed_bytes() const { return kRuntimeBytes + instance_bytes_ + table_bytes_; }
 

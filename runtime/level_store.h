@@ -78,6 +78,7 @@ class LevelStore final : public LevelSource {
   void add_item(OpenAsset& asset, uint32_t slot, bool is_morph, std::vector<size_t>& numbers);
   Result<void> load_root(OpenAsset& asset);
   const TracedLevel* find_level(OpenAsset& asset, uint32_t slot, bool& may_ask);
+  const TracedMorph* find_morph(OpenAsset& asset, uint32_t slot);
   /// An item that is there, or that may be waited for; else it is asked for, if may_ask, which is false from then on.
   const Resident* find(size_t item, bool& may_ask);
   Result<Plan> plan_roots(const OpenAsset* newcomer) const;

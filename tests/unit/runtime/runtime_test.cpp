@@ -1285,6 +1285,16 @@ TEST_F(RuntimeTest, AssetsWithoutMeasuredMorphsDissolveAndSaySo) {
   EXPECT_NE(host.messages[0].find("dissolve"), std::string::npos) << host.messages[0];
 }
 
+TEST_F(RuntimeTest, AskingForAMorphAheadOfRaysIsNoFallback) {
+  RuntimeOptions options = morphing(0.5f);
+  options.residency = Residency::Progressive;
+  Host host(options);
+  host.add(write_swelling_sphere(path_of("swelling")));
+  host.plan();
+  host.runtime().prefetch();
+  EXPECT_EQ(host.runtime().stats().fallbacks, 0u);
+}
+
 TEST_F(RuntimeTest, AFrameInProgressGoesOnWithOneOfTheLevelsUntilTheMorphIsThere) {
   const std::filesystem::path asset = write_swelling_sphere(path_of("swelling"));
   RuntimeOptions options = morphing(0.5f);
