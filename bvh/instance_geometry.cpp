@@ -18,6 +18,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <numeric>
 
 #include "base/check.h"
 #include "base/hash.h"
@@ -28,13 +29,8 @@ namespace farfield {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-// World bounds grow by this fraction of their size and of their distance from the origin: the transform of a ray there
-// rounds by a few times 2^-24 of the coordinates it adds up.
-constexpr float kRelativePad = 1e-6f;
 // How much the range in which a ray meets an instance's local bounds is widened: rounding of the slab test.
 constexpr float kRangePad = 1e-6f;
-// The largest coordinate that Embree takes: see is_traceable().
-constexpr float kEmbreeLargest = 1.8e18f;
 
 vec3 origin_of(const EmbreeRay& ray) { return {ray.org_x, ray.org_y, ray.org_z}; }
 vec3 direction_of(const EmbreeRay& ray) { return {ray.dir_x, ray.dir_y, ray.dir_z}; }
@@ -63,99 +59,37 @@ class InLocalSpace {
 /// Random bits of a ray in an instance.
 uint64_t bits_of_ray(const RayContext& context, uint32_t instance) { return mix64(context.ray_seed, instance); }
 
-glm::dmat3 linear_part(const mat4x3& m) { return {glm::dvec3(m[0]), glm::dvec3(m[1]), glm::dvec3(m[2])}; }
-
-bool is_in_range(const vec3& v) { return max_component(glm::abs(v)) <= kEmbreeLargest && is_finite(v); }
-
-bool is_in_range(const glm::dvec3& v) { return is_in_range(vec3(v)); }
-
-bool is_in_range(const glm::dmat3& m) { return is_in_range(m[0]) && is_in_range(m[1]) && is_in_range(m[2]); }
-
 }  // namespace
-
-// --- Instances -------------------------------------------------------------------------------------------------------
-
-vec3 InstanceRecord::normal_to_world(const vec3& n) const {
-  return static_cast<float>(handedness) *
-         (n.x * vec3(world_to_local[0]) + n.y * vec3(world_to_local[1]) + n.z * vec3(world_to_local[2]));
-}
-
-mat3 InstanceRecord::linear_to_local() const {
-  return glm::transpose(mat3(vec3(world_to_local[0]), vec3(world_to_local[1]), vec3(world_to_local[2])));
-}
-
-Result<InstanceRecord> make_instance(uint32_t asset, const mat4x3& local_to_world) {
-  const auto invalid = [](const char* why) {
-    return make_error(ErrorCode::InvalidArgument, fmt::format("the instance's transform {}", why));
-  };
-  const glm::dmat3 linear = linear_part(local_to_world);
-  const glm::dvec3 translation(local_to_world[3]);
-  if (!is_in_range(linear) || !is_in_range(translation)) return invalid("is not finite, or beyond 1.8e18");
-  const double determinant = glm::determinant(linear);
-  const glm::dmat3 inverse = glm::inverse(linear);
-  const glm::dvec3 back = -(inverse * translation);
-  if (determinant == 0.0 || !is_in_range(inverse) || !is_in_range(back)) {
-    return invalid("cannot be inverted: give every axis a length that is not zero");
-  }
-  InstanceRecord record;
-  for (int row = 0; row < 3; ++row) {
-    record.world_to_local[static_cast<size_t>(row)] =
-        vec4(glm::dvec4(inverse[0][row], inverse[1][row], inverse[2][row], back[row]));
-  }
-  record.asset = asset;
-  record.handedness = determinant < 0.0 ? -1 : 1;
-  return record;
-}
-
-float largest_stretch(const mat4x3& local_to_world) {
-  // The largest eigenvalue of A^T A by its trigonometric closed form [Smith 1961].
-  const glm::dmat3 a = linear_part(local_to_world);
-  const glm::dmat3 b = glm::transpose(a) * a;
-  const double mean = (b[0][0] + b[1][1] + b[2][2]) / 3.0;
-  const double off = b[1][0] * b[1][0] + b[2][0] * b[2][0] + b[2][1] * b[2][1];
-  const glm::dvec3 diagonal(b[0][0] - mean, b[1][1] - mean, b[2][2] - mean);
-  const double spread = std::sqrt((glm::dot(diagonal, diagonal) + 2.0 * off) / 6.0);
-  if (!(spread > 0.0)) return static_cast<float>(std::sqrt(mean));
-  const double half_det = glm::determinant((b - mean * glm::dmat3(1.0)) / spread) / 2.0;
-  const double angle = std::acos(std::clamp(half_det, -1.0, 1.0)) / 3.0;
-  return static_cast<float>(std::sqrt(mean + 2.0 * spread * std::cos(angle)));
-}
-
-Box3 instance_bounds(const InstanceRecord& instance, const TracedAsset& asset) {
-  // From the rounded inverse that rays really use.
-  const glm::dmat3 to_world = glm::inverse(glm::dmat3(instance.linear_to_local()));
-  const glm::dvec3 back(instance.world_to_local[0].w, instance.world_to_local[1].w, instance.world_to_local[2].w);
-  Box3 bounds;
-  const auto extend = [&](const vec3& p) { bounds.extend(vec3(to_world * (glm::dvec3(p) - back))); };
-  if (asset.hull.empty()) {
-    for (int i = 0; i < 8; ++i) extend(asset.bounds.corner(i));
-  }
-  for (const vec3& p : asset.hull) extend(p);
-  const float far = std::max(max_component(glm::abs(bounds.lower)), max_component(glm::abs(bounds.upper)));
-  const vec3 pad(kRelativePad * (max_component(bounds.size()) + far));
-  return {bounds.lower - pad, bounds.upper + pad};
-}
 
 // --- Rays ------------------------------------------------------------------------------------------------------------
 
 /// A ray that enters an instance: with which level it deals there.
 struct InstanceGeometry::Visit {
   LocalRay ray;
+  float t_entry;
   LevelChoice choice;
   const TracedLevel* level = nullptr;
   const TracedMorph* morph = nullptr;  ///< in place of the level
 };
 
-/// Fills in `visit`. False: the ray passes by.
-bool InstanceGeometry::enter(uint32_t instance, const EmbreeRay& ray, const RayContext& context, Visit& visit) const {
-  const InstanceRecord& record = instances[instance];
+/// Fills in `visit` but for the level itself. False: the ray passes by.
+inline bool InstanceGeometry::choose(const InstanceRecord& record, uint32_t instance, const EmbreeRay& ray,
+                                     const RayContext& context, Visit& visit) const {
   const TracedAsset& asset = *assets[record.asset];
   visit.ray = {record.point_to_local(origin_of(ray)), record.vector_to_local(direction_of(ray)), ray.tnear, ray.tfar};
   if (!is_traceable(visit.ray)) return false;
   const RayRange range = clip_to_box(visit.ray, asset.bounds);
   if (!(range.t_near * (1.0f - kRangePad) <= range.t_far * (1.0f + kRangePad))) return false;
-
+  visit.t_entry = range.t_near;
   visit.choice = choose_level(asset, record.footprint, record.limits, instance, context, range.t_near, forced_lambda);
+  return true;
+}
+
+/// Fills in `visit`. False: the ray passes by.
+bool InstanceGeometry::enter(const InstanceRecord& record, uint32_t instance, const EmbreeRay& ray,
+                             const RayContext& context, Visit& visit) const {
+  if (!choose(record, instance, ray, context, visit)) return false;
+  const TracedAsset& asset = *assets[record.asset];
   if (visit.choice.blend > 0.0f) {
     visit.morph = asset.morphs[visit.choice.slot].load(std::memory_order_acquire);
     if (!visit.morph) visit.morph = source_.serve_morph(record.asset, visit.choice.slot);
@@ -213,8 +147,10 @@ bool InstanceGeometry::intersect_morph(const Visit& visit, uint64_t ray_bits, Em
 
 bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, EmbreeRayHit& ray_hit,
                                  const RayContext& context, EmbreeContext* embree_context, HitRecord* record) const {
+  std::optional<InstanceRecord> moved;
+  const InstanceRecord& hit_instance = record_at(instance, ray_hit.ray.time, moved);
   Visit visit;
-  if (!enter(instance, ray_hit.ray, context, visit)) return false;
+  if (!enter(hit_instance, instance, ray_hit.ray, context, visit)) return false;
   EmbreeRay& ray = ray_hit.ray;
   RTCHit& hit = ray_hit.hit;
   const unsigned outer_id = hit.geomID;
@@ -227,7 +163,6 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
     return false;
   }
   made.instance = instance;
-  const InstanceRecord& hit_instance = instances[instance];
   made.lambda = lambda_of_choice(*assets[hit_instance.asset], hit_instance.footprint, hit_instance.limits, visit.choice,
                                  forced_lambda);
   vec3 normal_world(0.0f);
@@ -249,8 +184,9 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
 
 bool InstanceGeometry::occluded(uint32_t instance, EmbreeRay& ray, RayContext& context,
                                 EmbreeContext* embree_context) const {
+  std::optional<InstanceRecord> moved;
   Visit visit;
-  if (!enter(instance, ray, context, visit)) return false;
+  if (!enter(record_at(instance, ray.time, moved), instance, ray, context, visit)) return false;
   float* const transmittance = context.transmittance >= 0.0f ? &context.transmittance : nullptr;
   if (visit.morph) {
     const InLocalSpace scope(ray, visit.ray);
@@ -277,7 +213,10 @@ bool InstanceGeometry::occluded(uint32_t instance, EmbreeRay& ray, RayContext& c
 
 void InstanceGeometry::bounds_callback(const RTCBoundsFunctionArguments* args) {
   const auto& self = *static_cast<const InstanceGeometry*>(args->geometryUserPtr);
-  const InstanceRecord& instance = self.instances[args->primID];
+  const uint64_t segments = self.time_segments_;
+  const float time = segments == 0 ? 0.0f : static_cast<float>(args->timeStep) / static_cast<float>(segments);
+  std::optional<InstanceRecord> moved;
+  const InstanceRecord& instance = self.record_at(args->primID, time, moved);
   // The empty box of a hidden instance is not valid: Embree leaves it out.
   const Box3 bounds = self.is_hidden(args->primID) ? Box3() : instance_bounds(instance, *self.assets[instance.asset]);
   args->bounds_o->lower_x = bounds.lower.x, args->bounds_o->upper_x = bounds.upper.x;
@@ -468,6 +407,75 @@ void InstanceGeometry::occlude_others(const RTCOccludedFunctionNArguments* args)
   }
 }
 
+const InstanceRecord& InstanceGeometry::move(uint32_t instance, float time,
+                                             std::optional<InstanceRecord>& moved) const {
+  moved = motions_.at(instance).at(instances[instance], time);
+  return *moved;
+}
+
+std::optional<InstanceGeometry::Entry> InstanceGeometry::entry_of(uint32_t instance, const EmbreeRay& ray,
+                                                                  const RayContext& context) const {
+  std::optional<InstanceRecord> moved;
+  Visit visit;
+  if (is_hidden(instance) || !choose(record_at(instance, ray.time, moved), instance, ray, context, visit))
+    return std::nullopt;
+  return Entry{visit.t_entry, visit.choice};
+}
+
+Box3 InstanceGeometry::bounds_over_time(uint32_t instance) const {
+  const TracedAsset& asset = *assets[instances[instance].asset];
+  if (!instances[instance].moves) return instance_bounds(instances[instance], asset);
+  Box3 bounds;
+  const size_t segments = motions_.at(instance).key_count() - 1;
+  for (size_t key = 0; key <= segments; ++key) {
+    std::optional<InstanceRecord> moved;
+    const float time = static_cast<float>(key) / static_cast<float>(segments);
+    bounds.extend(instance_bounds(move(instance, time, moved), asset));
+  }
+  return bounds;
+}
+
+/// So many segments of the time between 0 and 1 that every key of every motion lies between two of them.
+uint64_t InstanceGeometry::time_segments() const {
+  uint64_t segments = 0;
+  for (const auto& [of_motion, count] : motions_with_segments_) {
+    segments = segments == 0 ? of_motion : std::lcm(segments, of_motion);
+    if (segments >= InstanceMotion::kMostKeys) break;  // more never make it fewer
+  }
+  return segments;
+}
+
+std::optional<InstanceMotion> InstanceGeometry::motion(uint32_t instance) const {
+  if (!instances[instance].moves) return std::nullopt;
+  return motions_.at(instance);
+}
+
+void InstanceGeometry::replace_motion(uint32_t instance, std::optional<InstanceMotion> motion) {
+  if (const auto former = motions_.find(instance); former != motions_.end()) {
+    const auto with_segments = motions_with_segments_.find(former->second.key_count() - 1);
+    if (--with_segments->second == 0) motions_with_segments_.erase(with_segments);
+    motion_bytes_ -= former->second.bytes();
+    motions_.erase(former);
+  }
+  instances[instance].moves = motion.has_value();
+  if (!motion) return;
+  ++motions_with_segments_[motion->key_count() - 1];
+  motion_bytes_ += motion->bytes();
+  motions_.emplace(instance, std::move(*motion));
+}
+
+Result<void> InstanceGeometry::set_motion(uint32_t instance, std::optional<InstanceMotion> motion) {
+  const size_t keys = motion ? motion->key_count() : 0;
+  std::optional<InstanceMotion> former = this->motion(instance);
+  replace_motion(instance, std::move(motion));
+  if (time_segments() < InstanceMotion::kMostKeys) return {};
+  replace_motion(instance, std::move(former));
+  return make_error(ErrorCode::InvalidArgument,
+                    fmt::format("{} keys and those of other motions have no common times that Embree could take; "
+                                "2, 3, 5, 9, 17, ... keys always have",
+                                keys));
+}
+
 void InstanceGeometry::set_hidden(uint32_t instance, bool is_hidden) {
   if (!is_hidden && instance >= hidden.size()) return;
   if (instance >= hidden.size()) hidden.resize(instances.size());
@@ -485,6 +493,8 @@ EmbreeGeometry InstanceGeometry::create(EmbreeDeviceRef device) {
 }
 
 void InstanceGeometry::update(EmbreeGeometryRef geometry) {
+  time_segments_ = time_segments();
+  set_time_steps(geometry, static_cast<unsigned>(time_segments_ + 1));
   rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(instances.size()));
   commit_geometry(geometry);
 }

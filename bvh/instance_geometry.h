@@ -2,49 +2,20 @@
 // All instances of all assets as one Embree user geometry: primitive = instance (docs/architecture.md, decision 1).
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "base/embree.h"
 #include "base/result.h"
 #include "base/vec.h"
-#include "bvh/level_choice.h"
+#include "bvh/instance_motion.h"
+#include "bvh/instance_record.h"
 #include "bvh/traced_asset.h"
 
 namespace farfield {
-
-/// One instance: what a ray needs in one cache line.
-struct alignas(64) InstanceRecord {
-  std::array<vec4, 3> world_to_local;  ///< rows
-  InstanceFootprint footprint;
-  uint32_t asset = 0;
-  int8_t handedness = 1;  ///< sign of the transform's determinant
-  LevelLimits limits;
-
-  vec3 point_to_local(const vec3& p) const {
-    const auto row = [&](const vec4& r) { return r.x * p.x + r.y * p.y + r.z * p.z + r.w; };
-    return {row(world_to_local[0]), row(world_to_local[1]), row(world_to_local[2])};
-  }
-  vec3 vector_to_local(const vec3& v) const {
-    const auto row = [&](const vec4& r) { return r.x * v.x + r.y * v.y + r.z * v.z; };
-    return {row(world_to_local[0]), row(world_to_local[1]), row(world_to_local[2])};
-  }
-  /// World-space normal of a local one, up to scale: transpose(W2L) n; flips under mirroring like a flattened mesh's.
-  vec3 normal_to_world(const vec3& n) const;
-  /// The linear part of world_to_local.
-  mat3 linear_to_local() const;
-};
-static_assert(sizeof(InstanceRecord) == 64);
-
-/// An instance of `asset`, footprint not set. Errors: InvalidArgument (not finite, not invertible in float).
-Result<InstanceRecord> make_instance(uint32_t asset, const mat4x3& local_to_world);
-/// The largest factor by which the transform stretches a length: what instance scales mean for footprints, so that
-/// an instance that is squeezed along one axis keeps the detail along the others.
-float largest_stretch(const mat4x3& local_to_world);
-/// World bounds that contain all that rays can hit of the instance, rounding included.
-Box3 instance_bounds(const InstanceRecord& instance, const TracedAsset& asset);
 
 /// Instances and assets, and the callbacks that Embree calls for them. Rays may run from any thread while nobody
 /// changes the tables. Queries should pass the `embree` member of a RayContext or of RayContexts as context; the scene
@@ -61,6 +32,25 @@ class InstanceGeometry {
 
   bool is_hidden(uint32_t instance) const { return instance < hidden.size() && hidden[instance]; }
   void set_hidden(uint32_t instance, bool is_hidden);
+  /// The instance at a ray's time: its record, or `moved` after that was made to hold what a moving one is.
+  const InstanceRecord& record_at(uint32_t instance, float time, std::optional<InstanceRecord>& moved) const {
+    const InstanceRecord& record = instances[instance];
+    return record.moves ? move(instance, time, moved) : record;
+  }
+  /// The level that a ray would deal with in an instance, and where it enters the bounds; none: it passes them by.
+  struct Entry {
+    float t;
+    LevelChoice choice;
+  };
+  std::optional<Entry> entry_of(uint32_t instance, const EmbreeRay& ray, const RayContext& context) const;
+  /// World bounds of the instance over all ray times.
+  Box3 bounds_over_time(uint32_t instance) const;
+  /// How an instance moves while the shutter is open; none: it stands still.
+  std::optional<InstanceMotion> motion(uint32_t instance) const;
+  /// The record of an instance that moves is that of the beginning. Errors: InvalidArgument (its keys and those of
+  /// other motions have no common times that Embree could take; the former motion stays).
+  Result<void> set_motion(uint32_t instance, std::optional<InstanceMotion> motion);
+  uint64_t motion_bytes() const { return motion_bytes_; }
 
   /// A new user geometry over all instances, committed. Refers to this object. Call update() after instances were
   /// added, moved, hidden or shown.
@@ -69,6 +59,10 @@ class InstanceGeometry {
   void update(EmbreeGeometryRef geometry);
 
  private:
+  uint64_t time_segments() const;
+  void replace_motion(uint32_t instance, std::optional<InstanceMotion> motion);
+  [[gnu::noinline]] const InstanceRecord& move(uint32_t instance, float time,
+                                               std::optional<InstanceRecord>& moved) const;
   static void bounds_callback(const RTCBoundsFunctionArguments* args);
   static void intersect_callback(const RTCIntersectFunctionNArguments* args);
   static void occluded_callback(const RTCOccludedFunctionNArguments* args);
@@ -84,12 +78,19 @@ class InstanceGeometry {
                               EmbreeContext& embree_context, HitRecord& made);
   static bool intersect_morph(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
                               EmbreeContext& embree_context, HitRecord& made);
-  bool enter(uint32_t instance, const EmbreeRay& ray, const RayContext& context, Visit& visit) const;
+  bool choose(const InstanceRecord& record, uint32_t instance, const EmbreeRay& ray, const RayContext& context,
+              Visit& visit) const;
+  bool enter(const InstanceRecord& record, uint32_t instance, const EmbreeRay& ray, const RayContext& context,
+             Visit& visit) const;
   bool intersect(uint32_t instance, unsigned geometry_id, EmbreeRayHit& ray_hit, const RayContext& context,
                  EmbreeContext* embree_context, HitRecord* record) const;
   bool occluded(uint32_t instance, EmbreeRay& ray, RayContext& context, EmbreeContext* embree_context) const;
 
   LevelSource& source_;
+  std::unordered_map<uint32_t, InstanceMotion> motions_;  ///< of the instances whose record says that they move
+  std::map<size_t, size_t> motions_with_segments_;        ///< how many motions have how many segments between keys
+  uint64_t motion_bytes_ = 0;
+  uint64_t time_segments_ = 0;  ///< of Embree's geometry; 0 where nothing moves
 };
 
 }  // namespace farfield

@@ -83,7 +83,11 @@ void ResidentSet::load(size_t index, std::unique_lock<std::mutex>& lock) {
 
   reserved_bytes_ = 0;
   const Result<void> settled = settle(item, loaded);
-  if (settled) stats_.load_seconds += seconds.count();
+  if (settled) {
+    stats_.load_seconds += seconds.count();
+    item.stats.load_seconds += seconds.count();
+    ++item.stats.loads;
+  }
 
   lock.unlock();
   if (!settled) {
@@ -191,6 +195,11 @@ uint64_t ResidentSet::resident_bytes(size_t item) const {
 uint64_t ResidentSet::build_peak_bytes(size_t item) const {
   const std::lock_guard lock(mutex_);
   return items_[item].planned.build_peak_bytes;
+}
+
+ItemStats ResidentSet::item_stats(size_t item) const {
+  const std::lock_guard lock(mutex_);
+  return items_[item].stats;
 }
 
 void ResidentSet::set_other_bytes(uint64_t bytes) {

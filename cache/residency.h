@@ -61,6 +61,12 @@ enum class ItemState : uint8_t {
   Broken,   ///< its load failed; it stays so
 };
 
+/// What one item has taken so far.
+struct ItemStats {
+  uint64_t loads = 0;       ///< that succeeded, reloads included
+  double load_seconds = 0;  ///< wall time, summed over them
+};
+
 struct ResidencyStats {
   uint64_t accounted_bytes = 0;
   uint64_t peak_accounted_bytes = 0;
@@ -101,6 +107,7 @@ class ResidentSet {
   /// Latest known size: planned until the first load, then what the last load took. For the planner.
   uint64_t resident_bytes(size_t item) const;
   uint64_t build_peak_bytes(size_t item) const;
+  ItemStats item_stats(size_t item) const;
 
   /// Destroys the objects of those of these items that are Ready, and makes them Empty; Refused ones too.
   void release(std::span<const size_t> items);
@@ -117,6 +124,7 @@ class ResidentSet {
     std::atomic<ItemState> state{ItemState::Empty};  ///< written under mutex_
     ResidencyItem planned;                           ///< sizes guarded by mutex_; those of the last load after one
     std::unique_ptr<Resident> object;                ///< guarded by mutex_
+    ItemStats stats;                                 ///< guarded by mutex_
   };
 
   const Resident* acquire_slowly(size_t item);

@@ -2,6 +2,8 @@
 // Pinhole and orthographic cameras: rays, their cones, and what the runtime needs to know of them.
 #pragma once
 
+#include <span>
+
 #include "base/vec.h"
 #include "farfield/runtime.h"
 
@@ -49,5 +51,9 @@ class Camera {
   vec3 position_{0.0f};
   vec3 right_{0.0f}, up_{0.0f}, forward_{0.0f};  ///< orthonormal
 };
+
+/// What a camera that moves sees at a time of its open shutter in [0, 1]: between the cameras of evenly spaced times
+/// (one: it stands still; of the same kind and size), each ray goes linearly from one to the next.
+CameraRay ray_at(std::span<const Camera> keys, float x_px, float y_px, float time);
 
 }  // namespace farfield

@@ -64,6 +64,7 @@ std::string make_fingerprint(const RenderOptions& options, std::span<const fs::p
   // Said only where they differ: shots from before know no others.
   if (options.turn_sun) text += " sun turned";
   if (options.blend_window != 1.0f) text += fmt::format(" blend window {}", options.blend_window);
+  if (options.shutter > 0) text += fmt::format(" shutter {}", options.shutter);
   if (options.off_screen_scale != 1.0f) text += fmt::format(" off screen {}", options.off_screen_scale);
   for (const fs::path& folder : asset_folders)
     if (!folder.empty()) text += fmt::format(" {}:{}", folder.filename().string(), to_hex(manifest_hash(folder)));
@@ -98,6 +99,20 @@ Metadata frame_metadata(const RenderOptions& options, const GltfScene& scene, co
   return metadata;
 }
 
+/// When the shutter is open: evenly spaced times, the frame's own in the middle, in seconds. Between two of them what
+/// moves goes straight.
+std::vector<double> shutter_times(const GltfScene& scene, double shutter, int frame) {
+  constexpr int kSegments = 4;
+  if (!(shutter > 0)) return {scene.seconds_of_frame(frame)};
+  std::vector<double> times;
+  for (int i = 0; i <= kSegments; ++i) {
+    times.push_back(scene.seconds_of_frame(frame + shutter * (static_cast<double>(i) / kSegments - 0.5)));
+  }
+  return times;
+}
+
+using Keys = std::vector<std::vector<GltfInstance>>;  // per time of the open shutter
+
 bool same_instances(std::span<const GltfInstance> a, std::span<const GltfInstance> b) {
   return std::ranges::equal(a, b, {}, &GltfInstance::mesh, &GltfInstance::mesh);
 }
@@ -112,23 +127,34 @@ class PlacedInstances {
  public:
   explicit PlacedInstances(const GltfScene& scene) : scene_(scene), do_move_(scene.do_instances_move()) {}
 
-  std::span<const GltfInstance> get() const { return do_move_ ? std::span(placed_) : std::span(scene_.instances); }
+  /// In the middle of the open shutter.
+  std::span<const GltfInstance> get() const {
+    return do_move_ ? std::span(keys_[keys_.size() / 2]) : std::span(scene_.instances);
+  }
+  /// At the times of the open shutter; none if nothing ever moves.
+  const Keys& keys() const { return keys_; }
   enum class Change { None, Places, Instances };
-  /// What is different from before: nothing, where they stand, or which there are.
-  Change move_to(double seconds) {
+  /// What is different from before: nothing, where they stand, or which there are. Where some come or go while the
+  /// shutter is open, all stand as they do in the middle, and it is said.
+  Change move_to(std::span<const double> times, const RenderOptions& options) {
     if (!do_move_) return Change::None;
-    std::vector<GltfInstance> placed = scene_.instances_at(seconds);
-    const Change change = !same_instances(placed, placed_) ? Change::Instances
-                          : !same_places(placed, placed_)  ? Change::Places
-                                                           : Change::None;
-    placed_ = std::move(placed);
+    Keys keys;
+    for (const double seconds : times) keys.push_back(scene_.instances_at(seconds));
+    if (!std::ranges::all_of(keys, [&](const auto& key) { return same_instances(key, keys.front()); })) {
+      keys = {keys[keys.size() / 2]};
+      options.warning("no motion blur of instances in frames in which some appear or vanish");
+    }
+    const Change change = keys_.empty() || !same_instances(keys.front(), keys_.front()) ? Change::Instances
+                          : !std::ranges::equal(keys, keys_, same_places)               ? Change::Places
+                                                                                        : Change::None;
+    keys_ = std::move(keys);
     return change;
   }
 
  private:
   const GltfScene& scene_;
   bool do_move_;
-  std::vector<GltfInstance> placed_;
+  Keys keys_;
 };
 
 void report_problems(const RenderOptions& options, const FrameReport& frame) {
@@ -181,6 +207,23 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOption
   return renderer;
 }
 
+Result<PixelReport> FrameRenderer::explain(int frame, int x, int y) {
+  constexpr int kRays = 1024;
+  FARFIELD_TRY_LET(auto device, make_embree_device(thread_count()));
+  const double seconds = scene_.seconds_of_frame(frame);
+  PlacedInstances instances(scene_);
+  instances.move_to(std::span(&seconds, 1), options_);
+  FARFIELD_TRY_LET(const auto session,
+                   RenderSession::open(device.get(), options_, asset_folders_, instances.get(), material_names_));
+  const Camera camera = make_camera(scene_, camera_, seconds, options_.width, options_.height);
+  PixelReport report;
+  report.frame = frame, report.x = x, report.y = y;
+  report.width = options_.width, report.height = options_.height;
+  report.rays = kRays;
+  FARFIELD_TRY(session->explain(camera, options_, asset_names_, instances.get(), report));
+  return report;
+}
+
 Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const FrameSink& sink) {
   // Everything of ours first, assets last: see warm_up.h.
   Film film(options_.width, options_.height, {.ids = options_.cryptomatte});
@@ -197,31 +240,35 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
   std::unique_ptr<RenderSession> session;
   PlacedInstances instances(scene_);
   for (size_t i = 0; i < frames.size(); ++i) {
-    const double seconds = scene_.seconds_of_frame(frames[i]);
-    const PlacedInstances::Change change = instances.move_to(seconds);
-    if (session && change == PlacedInstances::Change::Places) {
-      FARFIELD_TRY(session->move(instances.get()));
-    } else if (!session || change == PlacedInstances::Change::Instances) {
+    const std::vector<double> times = shutter_times(scene_, options_.shutter, frames[i]);
+    const PlacedInstances::Change change = instances.move_to(times, options_);
+    if (!session || change == PlacedInstances::Change::Instances) {
       session.reset();  // before the next one, so that two never share the budget
       FARFIELD_TRY_LET(auto opened,
                        RenderSession::open(device.get(), options_, asset_folders_, instances.get(), material_names_));
       session = std::move(opened);
+      if (instances.keys().size() > 1) FARFIELD_TRY(session->move(instances.keys()));
+    } else if (change == PlacedInstances::Change::Places) {
+      FARFIELD_TRY(session->move(instances.keys()));
     }
 
-    const Camera camera = make_camera(scene_, camera_, seconds, options_.width, options_.height);
+    std::vector<Camera> cameras;
+    for (const double seconds : times)
+      cameras.push_back(make_camera(scene_, camera_, seconds, options_.width, options_.height));
     const auto done_after = [&](size_t count) {
       return static_cast<double>(count) / static_cast<double>(frames.size());
     };
     const Job job = options_.job.step(fmt::format("frame {} ({}/{})", frames[i], i + 1, frames.size()), done_after(i),
                                       done_after(i + 1));
-    FARFIELD_TRY_LET(auto frame, session->render(camera, lights_, options_, film, job));
+    FARFIELD_TRY_LET(auto frame, session->render(cameras, lights_, options_, film, job));
     frame.frame = frames[i];
     report_problems(options_, frame);
     report.frames.push_back(std::move(frame));
     report.peak_accounted_bytes = std::max(report.peak_accounted_bytes, session->stats().peak_accounted_bytes);
     report.peak_rss_bytes = memory.peak_bytes();
     report.warnings = warnings_->lines();
-    const Metadata metadata = frame_metadata(options_, scene_, camera, frames[i], instances.get(), material_names_);
+    const Camera& middle = cameras[cameras.size() / 2];
+    const Metadata metadata = frame_metadata(options_, scene_, middle, frames[i], instances.get(), material_names_);
     if (auto taken = sink(film.image(), metadata, report); !taken) return tl::unexpected(taken.error());
   }
   report.peak_rss_bytes = memory.peak_bytes();

@@ -13,6 +13,7 @@
 #include "import/gltf_scene.h"
 #include "path_tracer/image.h"
 #include "path_tracer/integrator.h"
+#include "path_tracer/pixel_report.h"
 #include "path_tracer/render_job.h"
 #include "path_tracer/scene_names.h"
 #include "path_tracer/warning_log.h"
@@ -37,6 +38,9 @@ class FrameRenderer {
   /// Renders frames in the order given. The process's memory is measured from just before the assets are opened.
   /// Errors: those of warm_up, RenderSession and the sink; Cancelled.
   Result<RenderReport> render(std::span<const int> frames, const FrameSink& sink);
+
+  /// Looks at a pixel of a frame; x and y lie in the picture. Errors: those of RenderSession.
+  Result<PixelReport> explain(int frame, int x, int y);
 
  private:
   FrameRenderer() = default;

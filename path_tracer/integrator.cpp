@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <mutex>
 
 #include "base/hash.h"
 #include "base/parallel.h"
@@ -42,8 +43,8 @@ class PathTracer {
   PathTracer(const TraceScene& scene, const TraceOptions& options, const vec3& view_axis)
       : scene_(scene), lights_(*scene.lights), options_(options), view_axis_(view_axis) {}
 
-  /// light_choice: uniform in [0, 1), for the first event's EnvironmentSample.
-  FilmSample trace(const CameraRay& camera_ray, uint64_t path_key, float light_choice);
+  /// time: of the open shutter, in [0, 1]. light_choice: uniform in [0, 1), for the first event's EnvironmentSample.
+  FilmSample trace(const CameraRay& camera_ray, float time, uint64_t path_key, float light_choice);
 
   TraceStats stats;
 
@@ -68,6 +69,7 @@ class PathTracer {
   // Of the path in hand.
   Rng rng_{0};
   uint32_t path_seed_ = 0;
+  float time_ = 0;
   float light_choice_ = 0;
   int depth_ = 0;  ///< scattering events so far
   vec3 throughput_{1.0f};
@@ -89,6 +91,7 @@ void PathTracer::set_context(RayContext& context, const PathRay& ray) {
 bool PathTracer::intersect(const PathRay& ray) {
   set_context(context_, ray);
   ray_hit_ = make_ray_hit(ray.origin, ray.direction);
+  ray_hit_.ray.time = time_;
   ++stats.rays;
   return trace_nearest(scene_.embree, context_.embree, ray_hit_) &&
          ray_hit_.hit.geomID == scene_.runtime->geometry_id();
@@ -98,6 +101,7 @@ bool PathTracer::is_occluded(const PathRay& ray, float distance) {
   RayContext context;
   set_context(context, ray);
   EmbreeRay shadow_ray = make_ray(ray.origin, ray.direction, 0, distance);
+  shadow_ray.time = time_;
   ++stats.rays;
   return trace_occlusion(scene_.embree, context.embree, shadow_ray);
 }
@@ -205,9 +209,10 @@ void PathTracer::describe(const Interaction& seen, const CameraRay& camera_ray, 
   sample.ids[size_t(IdLayer::Material)] = scene_.ids->material(seen);
 }
 
-FilmSample PathTracer::trace(const CameraRay& camera_ray, uint64_t path_key, float light_choice) {
+FilmSample PathTracer::trace(const CameraRay& camera_ray, float time, uint64_t path_key, float light_choice) {
   rng_ = Rng(path_key);
   path_seed_ = rng_.next_uint();
+  time_ = time;
   light_choice_ = light_choice;
   depth_ = 0;
   throughput_ = vec3(1.0f);
@@ -223,6 +228,7 @@ FilmSample PathTracer::trace(const CameraRay& camera_ray, uint64_t path_key, flo
     }
     const Interaction vertex = scene_.runtime->interaction(ray_hit_, context_);
     last_hit_ = context_.hit;
+    stats.hits.add(scene_.runtime->asset_of({last_hit_.instance}).value, last_hit_.level_slot + last_hit_.is_coarser);
     if (depth_ == 0) describe(vertex, camera_ray, result);
     if (max_component(vertex.emission) > 0) add(vertex.emission);
     if (++depth_ > options_.max_depth) break;
@@ -261,8 +267,22 @@ class PixelLattice {
   uint32_t start_[3];
 };
 
+// When the paths of a pixel see the scene: golden steps from a random start.
+class PixelTimes {
+ public:
+  PixelTimes(uint64_t pixel_key, bool does_move) : start_(Rng(pixel_key, 2).next_uint()), does_move_(does_move) {}
+  float of(int sample) const {
+    constexpr uint32_t kStep = 2654435769u;  // 2^32 / golden ratio
+    return does_move_ ? static_cast<float>((start_ + static_cast<uint32_t>(sample) * kStep) >> 8) * 0x1p-24f : 0.0f;
+  }
+
+ private:
+  uint32_t start_;
+  bool does_move_;
+};
+
 // The pixels of one tile; every path's random numbers follow from the seed, the pixel and the sample alone.
-void trace_tile(PathTracer& tracer, const Camera& camera, const TraceOptions& options, int tile_x, int tile_y,
+void trace_tile(PathTracer& tracer, std::span<const Camera> keys, const TraceOptions& options, int tile_x, int tile_y,
                 Film& film) {
   const int x_end = std::min((tile_x + 1) * kTileSide, film.width());
   const int y_end = std::min((tile_y + 1) * kTileSide, film.height());
@@ -270,11 +290,13 @@ void trace_tile(PathTracer& tracer, const Camera& camera, const TraceOptions& op
     for (int x = tile_x * kTileSide; x < x_end; ++x) {
       const uint64_t pixel_key = mix64(options.seed, static_cast<uint64_t>(y) * film.width() + x);
       const PixelLattice lattice(pixel_key);
+      const PixelTimes times(pixel_key, keys.size() > 1);
       PixelSums sums(film.has_ids());
       for (int s = 0; s < options.samples_per_pixel; ++s) {
-        const CameraRay ray =
-            camera.ray(static_cast<float>(x) + lattice.value(s, 0), static_cast<float>(y) + lattice.value(s, 1));
-        sums.add(tracer.trace(ray, mix64(pixel_key, static_cast<uint64_t>(s)), lattice.value(s, 2)));
+        const float time = times.of(s);
+        const CameraRay ray = ray_at(keys, static_cast<float>(x) + lattice.value(s, 0),
+                                     static_cast<float>(y) + lattice.value(s, 1), time);
+        sums.add(tracer.trace(ray, time, mix64(pixel_key, static_cast<uint64_t>(s)), lattice.value(s, 2)));
       }
       film.set_pixel(x, y, sums);
     }
@@ -300,8 +322,10 @@ Result<EmbreeScene> make_scene(EmbreeDeviceRef device, Runtime& runtime, bool is
   return scene;
 }
 
-Result<TraceStats> path_trace(const TraceScene& scene, const Camera& camera, const TraceOptions& options, Film& film,
-                              const Job& job) {
+Result<TraceStats> path_trace(const TraceScene& scene, std::span<const Camera> keys, const TraceOptions& options,
+                              Film& film, const Job& job) {
+  if (keys.empty()) return make_error(ErrorCode::InvalidArgument, "there is no camera");
+  const Camera& camera = keys[keys.size() / 2];
   if (camera.width() != film.width() || camera.height() != film.height())
     return make_error(ErrorCode::InvalidArgument, "camera and film differ in size");
   if (options.samples_per_pixel < 1 || options.max_depth < 0)
@@ -312,11 +336,17 @@ Result<TraceStats> path_trace(const TraceScene& scene, const Camera& camera, con
   const auto tile_count = static_cast<size_t>(columns) * static_cast<size_t>(rows);
   // Only counters: nothing else is published through them.
   std::atomic<uint64_t> rays{0}, invalid_samples{0}, tiles_done{0};
+  LevelHits hits;
+  std::mutex hits_mutex;
 
   parallel_for(tile_count, 1, [&](size_t begin, size_t end) {
     for (size_t tile = begin; tile < end && !job.is_cancelled(); ++tile) {
       PathTracer tracer(scene, options, camera.forward());
-      trace_tile(tracer, camera, options, static_cast<int>(tile) % columns, static_cast<int>(tile) / columns, film);
+      trace_tile(tracer, keys, options, static_cast<int>(tile) % columns, static_cast<int>(tile) / columns, film);
+      {
+        const std::lock_guard lock(hits_mutex);
+        hits.add(tracer.stats.hits);
+      }
       rays += tracer.stats.rays;
       invalid_samples += tracer.stats.invalid_samples;
       const uint64_t done = ++tiles_done;
@@ -324,7 +354,7 @@ Result<TraceStats> path_trace(const TraceScene& scene, const Camera& camera, con
     }
   });
   if (tiles_done < tile_count) return make_error(ErrorCode::Cancelled, "cancelled");
-  return TraceStats{rays, invalid_samples};
+  return TraceStats{std::move(hits), rays, invalid_samples};
 }
 
 }  // namespace farfield

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/embree.h"
@@ -12,6 +13,7 @@
 #include "path_tracer/camera.h"
 #include "path_tracer/environment.h"
 #include "path_tracer/film.h"
+#include "path_tracer/level_hits.h"
 
 namespace farfield {
 
@@ -61,6 +63,7 @@ struct TraceOptions {
 };
 
 struct TraceStats {
+  LevelHits hits;                ///< of camera and scattered rays
   uint64_t rays = 0;             ///< camera, scattered and shadow rays
   uint64_t invalid_samples = 0;  ///< paths whose value was not finite; they count as black
 };
@@ -69,10 +72,15 @@ struct TraceStats {
 /// instances (kSmallSceneBytesPerInstance) and a little more time. Errors: those of Runtime::attach, Io (Embree).
 Result<EmbreeScene> make_scene(EmbreeDeviceRef device, Runtime& runtime, bool is_small = false);
 
-/// Renders `camera` into `film` (same size) on all threads of parallel_for. The image depends on the arguments alone,
-/// not on threads or time. The job reports from several threads at once and is polled for each tile of 16 x 16 pixels.
-/// Errors: Cancelled (the film is part done); InvalidArgument (sizes differ, no samples).
-Result<TraceStats> path_trace(const TraceScene& scene, const Camera& camera, const TraceOptions& options, Film& film,
-                              const Job& job = {});
+/// Renders what a camera sees while its shutter is open (see ray_at() for the keys; one stands still, and sees the
+/// instances at ray time 0) into `film` (same size) on all threads of parallel_for. The image depends on the arguments
+/// alone, not on threads or time. The job reports from several threads at once and is polled for each tile of 16 x 16
+/// pixels. Errors: Cancelled (the film is part done); InvalidArgument (sizes differ, no samples).
+Result<TraceStats> path_trace(const TraceScene& scene, std::span<const Camera> keys, const TraceOptions& options,
+                              Film& film, const Job& job = {});
+inline Result<TraceStats> path_trace(const TraceScene& scene, const Camera& camera, const TraceOptions& options,
+                                     Film& film, const Job& job = {}) {
+  return path_trace(scene, std::span(&camera, 1), options, film, job);
+}
 
 }  // namespace farfield

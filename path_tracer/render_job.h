@@ -38,6 +38,8 @@ struct RenderOptions {
   bool sky = true;                    ///< false: without an environment there is no light but the scene's own
   /// The sun, its sky and the scene's directional lights come from the opposite side: half a turn about +y.
   bool turn_sun = false;
+  /// How long the shutter is open, in frames, around each frame's time; 0: an instant.
+  double shutter = 0;
   float exposure_stops = 0;                           ///< of the PNG previews
   bool cryptomatte = false;                           ///< also write ids of objects and materials, see film.h
   uint32_t finest_grid = 512;                         ///< of assets that have to be baked first
@@ -53,6 +55,16 @@ struct RenderOptions {
   Job job;                                               ///< reports from any thread
 };
 
+/// What a level of an asset did in a frame.
+struct LevelUse {
+  uint32_t level = 0;           ///< k
+  uint64_t hits = 0;            ///< of camera and scattered rays
+  uint64_t loads = 0;           ///< reloads included
+  double load_seconds = 0;      ///< read, check, build
+  uint64_t resident_bytes = 0;  ///< after the frame
+  uint64_t served_coarser = 0;  ///< visits of rays that asked for it and got a coarser level
+};
+
 /// What a frame took. Bytes are the process's and the budget's; see ShotReport.
 struct FrameReport {
   int frame = 0;
@@ -64,13 +76,14 @@ struct FrameReport {
   uint64_t levels_loaded = 0;
   uint64_t fallbacks = 0;  ///< visits of rays to instances that a coarser level than planned served
   uint64_t rays = 0;
-  uint64_t invalid_samples = 0;        ///< paths whose value was not finite; black in the image
-  double bias = 0;                     ///< PlanSummary::bias
-  uint64_t asked_bytes = 0;            ///< a budget that would give nothing up
-  uint32_t morphs = 0;                 ///< PlanSummary::morphs
-  uint32_t morphs_given_up = 0;        ///< PlanSummary::morphs_given_up
-  std::vector<uint32_t> finest_level;  ///< per asset of RenderReport::assets: finest level that rays may use
-  std::vector<float> levels_given_up;  ///< per asset: how many levels coarser than asked, for the budget's sake
+  uint64_t invalid_samples = 0;               ///< paths whose value was not finite; black in the image
+  double bias = 0;                            ///< PlanSummary::bias
+  uint64_t asked_bytes = 0;                   ///< a budget that would give nothing up
+  uint32_t morphs = 0;                        ///< PlanSummary::morphs
+  uint32_t morphs_given_up = 0;               ///< PlanSummary::morphs_given_up
+  std::vector<uint32_t> finest_level;         ///< per asset of RenderReport::assets: finest level that rays may use
+  std::vector<std::vector<LevelUse>> levels;  ///< per asset: its stored levels that anything happened to
+  std::vector<float> levels_given_up;         ///< per asset: how many levels coarser than asked, for the budget's sake
 
   /// The picture is not what was planned: a level was lost or did not fit, which the warnings say.
   bool is_degraded() const { return fallbacks > 0; }

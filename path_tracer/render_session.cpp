@@ -11,6 +11,7 @@
 #include "base/process_memory.h"
 #include "base/process_time.h"
 #include "base/result.h"
+#include "path_tracer/pixel_look.h"
 
 namespace farfield {
 
@@ -81,6 +82,7 @@ Result<void> RenderSession::fill(EmbreeDeviceRef device, std::span<const std::fi
     is_shown_.push_back(!folders[mesh].empty());
     if (!is_shown_[mesh]) continue;
     FARFIELD_TRY_LET(assets[mesh], runtime_->open_asset(folders[mesh].string()));
+    assets_.push_back(assets[mesh]);
   }
   for (const GltfInstance& instance : instances) {
     if (!is_shown_[instance.mesh]) continue;
@@ -91,11 +93,15 @@ Result<void> RenderSession::fill(EmbreeDeviceRef device, std::span<const std::fi
   return {};
 }
 
-Result<void> RenderSession::move(std::span<const GltfInstance> instances) {
+Result<void> RenderSession::move(std::span<const std::vector<GltfInstance>> keys) {
   InstanceId id{0};
-  for (const GltfInstance& instance : instances) {
-    if (!is_shown_[instance.mesh]) continue;
-    FARFIELD_TRY(runtime_->move_instance(id, instance.to_world));
+  for (size_t i = 0; i < keys.front().size(); ++i) {
+    if (!is_shown_[keys.front()[i].mesh]) continue;
+    std::vector<mat4x3> places;
+    for (const std::vector<GltfInstance>& instances : keys) places.push_back(instances[i].to_world);
+    const bool is_still = std::ranges::count(places, places.front()) == std::ssize(places);
+    if (is_still) places.resize(1);
+    FARFIELD_TRY(runtime_->move_instance(id, places));
     ++id.value;
   }
   FARFIELD_TRY(runtime_->attach(scene_.get()));
@@ -103,15 +109,64 @@ Result<void> RenderSession::move(std::span<const GltfInstance> instances) {
   return {};
 }
 
-Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& lights, const RenderOptions& options,
-                                          Film& film, const Job& job) {
+Result<PlanSummary> RenderSession::plan(std::span<const Camera> camera, const RenderOptions& options) {
+  std::vector<TessellationCamera> tessellation;
+  for (const Camera& key : camera) {
+    tessellation.push_back(key.tessellation());
+    tessellation.back().off_screen_scale = options.off_screen_scale;
+  }
+  runtime_->set_cameras(std::move(tessellation));
+  return runtime_->plan_frame();
+}
+
+std::vector<std::vector<LevelStats>> RenderSession::level_stats() const {
+  std::vector<std::vector<LevelStats>> stats;
+  for (const AssetId asset : assets_) stats.push_back(runtime_->level_stats(asset));
+  return stats;
+}
+
+/// What happened to levels since `before`.
+std::vector<std::vector<LevelUse>> RenderSession::level_use(const std::vector<std::vector<LevelStats>>& before,
+                                                            const LevelHits& hits) const {
+  std::vector<std::vector<LevelUse>> uses(assets_.size());
+  for (size_t i = 0; i < assets_.size(); ++i) {
+    const std::vector<LevelStats> after = runtime_->level_stats(assets_[i]);
+    const std::vector<LevelInfo>& levels = runtime_->levels(assets_[i]);
+    for (uint32_t slot = 0; slot < after.size(); ++slot) {
+      const LevelStats &then = before[i][slot], &now = after[slot];
+      const LevelUse use{levels[slot].level,     hits.of(assets_[i].value, slot),
+                         now.loads - then.loads, now.load_seconds - then.load_seconds,
+                         now.resident_bytes,     now.fallbacks - then.fallbacks};
+      if (use.hits + use.loads + use.resident_bytes + use.served_coarser > 0) uses[i].push_back(use);
+    }
+  }
+  return uses;
+}
+
+Result<void> RenderSession::explain(const Camera& camera, const RenderOptions& options,
+                                    std::span<const std::string> names, std::span<const GltfInstance> instances,
+                                    PixelReport& report) {
+  FARFIELD_TRY_LET(const PlanSummary plan, this->plan({&camera, 1}, options));
+  report.budget_bytes = options.budget_bytes;
+  report.planned_bytes = plan.planned_bytes;
+  report.asked_bytes = plan.asked_bytes;
+
+  PixelNames by_id;
+  by_id.assets.resize(plan.levels_given_up.size());
+  for (size_t i = 0; i < assets_.size(); ++i) by_id.assets[assets_[i].value] = names[i];
+  for (const GltfInstance& instance : instances)
+    if (is_shown_[instance.mesh]) by_id.objects.push_back(object_name(instance));
+  look_at_pixel({scene_.get(), runtime_.get()}, camera, plan, by_id, report);
+  return {};
+}
+
+Result<FrameReport> RenderSession::render(std::span<const Camera> camera, const Lights& lights,
+                                          const RenderOptions& options, Film& film, const Job& job) {
   const auto start = std::chrono::steady_clock::now();
   const double cpu_start = process_cpu_seconds();
   const Stats before = runtime_->stats();
-  TessellationCamera tessellation = camera.tessellation();
-  tessellation.off_screen_scale = options.off_screen_scale;
-  runtime_->set_cameras({tessellation});
-  FARFIELD_TRY_LET(auto plan, runtime_->plan_frame());
+  const std::vector<std::vector<LevelStats>> levels_before = level_stats();
+  FARFIELD_TRY_LET(auto plan, this->plan(camera, options));
   runtime_->prefetch();
   malloc_trim(0);  // what writing the last frame left in the heap is not the assets'
 
@@ -133,6 +188,7 @@ Result<FrameReport> RenderSession::render(const Camera& camera, const Lights& li
   report.asked_bytes = plan.asked_bytes;
   report.morphs = plan.morphs;
   report.morphs_given_up = plan.morphs_given_up;
+  report.levels = level_use(levels_before, traced.hits);
   report.finest_level = std::move(plan.finest_level);
   report.levels_given_up = std::move(plan.levels_given_up);
   return report;

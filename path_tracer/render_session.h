@@ -12,6 +12,7 @@
 #include "base/result.h"
 #include "import/gltf_scene.h"
 #include "path_tracer/film.h"
+#include "path_tracer/pixel_report.h"
 #include "path_tracer/render_job.h"
 #include "path_tracer/scene_names.h"
 
@@ -28,13 +29,19 @@ class RenderSession {
                                                      std::span<const GltfInstance> instances,
                                                      const MaterialNames& names);
 
-  /// Places the instances anew: as many, of the same meshes in the same order. Errors: those of Runtime::move_instance.
-  Result<void> move(std::span<const GltfInstance> instances);
+  /// Places the instances anew, at evenly spaced times of the open shutter (one: they stand still): as many each time,
+  /// of the same meshes in the same order. Errors: those of Runtime::move_instance.
+  Result<void> move(std::span<const std::vector<GltfInstance>> keys);
 
-  /// Plans for the camera, loads, and renders into the film. The report's frame number is not
-  /// set. Errors: those of plan_frame and path_trace.
-  Result<FrameReport> render(const Camera& camera, const Lights& lights, const RenderOptions& options, Film& film,
-                             const Job& job);
+  /// Plans for the camera (its keys: see path_trace()), loads, and renders into the film. The report's frame number is
+  /// not set. Errors: those of plan_frame and path_trace.
+  Result<FrameReport> render(std::span<const Camera> camera, const Lights& lights, const RenderOptions& options,
+                             Film& film, const Job& job);
+
+  /// Plans for the camera and looks at the pixel that the report names. names: per shown mesh. instances: of open().
+  /// Errors: those of plan_frame.
+  Result<void> explain(const Camera& camera, const RenderOptions& options, std::span<const std::string> names,
+                       std::span<const GltfInstance> instances, PixelReport& report);
 
   Stats stats() const { return runtime_->stats(); }
 
@@ -42,8 +49,13 @@ class RenderSession {
   RenderSession() = default;
   Result<void> fill(EmbreeDeviceRef device, std::span<const std::filesystem::path> folders,
                     std::span<const GltfInstance> instances, const MaterialNames& names, bool is_small);
+  Result<PlanSummary> plan(std::span<const Camera> camera, const RenderOptions& options);
+  std::vector<std::vector<LevelStats>> level_stats() const;
+  std::vector<std::vector<LevelUse>> level_use(const std::vector<std::vector<LevelStats>>& before,
+                                               const LevelHits& hits) const;
   std::unique_ptr<Runtime> runtime_;
-  std::vector<bool> is_shown_;  ///< per mesh: it has a folder
+  std::vector<AssetId> assets_;  ///< that are shown, in the order of FrameReport::finest_level
+  std::vector<bool> is_shown_;   ///< per mesh: it has a folder
   SceneIds ids_;
   EmbreeScene scene_;
 };

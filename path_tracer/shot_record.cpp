@@ -23,6 +23,36 @@ Json by_asset(const std::vector<std::string>& assets, const std::vector<T>& valu
   return json;
 }
 
+Json use_to_json(const LevelUse& use) {
+  return {{"level", use.level},
+          {"hits", use.hits},
+          {"loads", use.loads},
+          {"load_seconds", use.load_seconds},
+          {"resident_bytes", use.resident_bytes},
+          {"served_coarser", use.served_coarser}};
+}
+
+LevelUse use_from_json(const Json& json) {
+  return {json.at("level"),        json.at("hits"),           json.at("loads"),
+          json.at("load_seconds"), json.at("resident_bytes"), json.at("served_coarser")};
+}
+
+Json levels_to_json(const std::vector<std::string>& assets, const std::vector<std::vector<LevelUse>>& levels) {
+  std::vector<Json> per_asset;
+  for (const std::vector<LevelUse>& uses : levels) {
+    per_asset.push_back(Json::array());
+    for (const LevelUse& use : uses) per_asset.back().push_back(use_to_json(use));
+  }
+  return by_asset(assets, per_asset);
+}
+
+std::vector<std::vector<LevelUse>> levels_from_json(const std::vector<std::string>& assets, const Json& json) {
+  std::vector<std::vector<LevelUse>> levels(assets.size());
+  for (size_t i = 0; i < assets.size(); ++i)
+    for (const Json& use : json.at(assets[i])) levels[i].push_back(use_from_json(use));
+  return levels;
+}
+
 Json frame_to_json(const FrameReport& frame, const std::vector<std::string>& assets) {
   return {{"frame", frame.frame},
           {"seconds", frame.seconds},
@@ -40,6 +70,7 @@ Json frame_to_json(const FrameReport& frame, const std::vector<std::string>& ass
           {"degraded", frame.is_degraded()},
           {"invalid_samples", frame.invalid_samples},
           {"finest_level", by_asset(assets, frame.finest_level)},
+          {"levels", levels_to_json(assets, frame.levels)},
           {"levels_given_up", by_asset(assets, frame.levels_given_up)}};
 }
 
@@ -59,6 +90,7 @@ FrameReport frame_from_json(const Json& json, const std::vector<std::string>& as
   json.at("levels_loaded").get_to(frame.levels_loaded);
   json.at("fallbacks").get_to(frame.fallbacks);
   json.at("invalid_samples").get_to(frame.invalid_samples);
+  if (json.contains("levels")) frame.levels = levels_from_json(assets, json.at("levels"));  // absent before 0.1
   for (const std::string& asset : assets) {
     frame.finest_level.push_back(json.at("finest_level").at(asset).get<uint32_t>());
     frame.levels_given_up.push_back(json.at("levels_given_up").at(asset).get<float>());

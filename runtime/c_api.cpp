@@ -209,6 +209,14 @@ FfStatus ff_move_instance(FfRuntime* runtime, uint32_t instance, const float loc
   return guarded([&] { return runtime->runtime->move_instance(InstanceId{instance}, to_matrix(local_to_world)); });
 }
 
+FfStatus ff_move_instance_keys(FfRuntime* runtime, uint32_t instance, const float* keys, size_t count) {
+  return guarded([&] {
+    std::vector<glm::mat4x3> places;
+    for (size_t i = 0; i < count; ++i) places.push_back(to_matrix(keys + 12 * i));
+    return runtime->runtime->move_instance(InstanceId{instance}, places);
+  });
+}
+
 FfStatus ff_set_visible(FfRuntime* runtime, uint32_t instance, int is_visible) {
   return guarded([&] { return runtime->runtime->set_visible(InstanceId{instance}, is_visible != 0); });
 }

@@ -29,8 +29,7 @@ void FramePlanner::note_moved(uint32_t instance) {
 void FramePlanner::update_footprint(uint32_t i, const std::vector<TessellationCamera>& of_cameras) {
   InstanceRecord& instance = geometry_.instances[i];
   const bool is_seen = !of_cameras.empty() && !geometry_.is_hidden(i);
-  instance.footprint.camera_footprint =
-      is_seen ? finest_footprint(of_cameras, instance_bounds(instance, *geometry_.assets[instance.asset])) : 0.0f;
+  instance.footprint.camera_footprint = is_seen ? finest_footprint(of_cameras, geometry_.bounds_over_time(i)) : 0.0f;
 }
 
 void FramePlanner::update_footprints(const std::vector<TessellationCamera>& of_cameras) {

@@ -36,7 +36,7 @@ const TracedLevel* LevelStore::serve(uint32_t asset_index, uint32_t slot) {
   bool may_ask = true;
   for (uint32_t served = slot; served < asset.traced.slot_count(); ++served) {
     if (const TracedLevel* level = find_level(asset, served, may_ask)) {
-      if (served != slot) fallbacks_.fetch_add(1, std::memory_order_relaxed);
+      if (served != slot) asset.fallbacks[slot].fetch_add(1, std::memory_order_relaxed);
       return level;
     }
   }
@@ -44,8 +44,9 @@ const TracedLevel* LevelStore::serve(uint32_t asset_index, uint32_t slot) {
 }
 
 const TracedMorph* LevelStore::serve_morph(uint32_t asset_index, uint32_t slot) {
-  const TracedMorph* morph = find_morph(*assets_[asset_index], slot);
-  if (!morph) fallbacks_.fetch_add(1, std::memory_order_relaxed);
+  OpenAsset& asset = *assets_[asset_index];
+  const TracedMorph* morph = find_morph(asset, slot);
+  if (!morph) asset.fallbacks[slot].fetch_add(1, std::memory_order_relaxed);
   return morph;
 }
 
@@ -109,6 +110,7 @@ void LevelStore::add_item(OpenAsset& asset, uint32_t slot, bool is_morph, std::v
 
 void LevelStore::add_items(OpenAsset& asset) {
   const uint32_t count = asset.traced.slot_count();
+  asset.fallbacks = std::make_unique<std::atomic<uint64_t>[]>(count);
   for (uint32_t slot = 0; slot < count; ++slot) add_item(asset, slot, false, asset.items);
   if (blend_ == Blend::Morph) {
     for (uint32_t slot = 0; slot < count; ++slot) {
@@ -251,6 +253,30 @@ void LevelStore::load(uint32_t asset, uint32_t slot) {
 }
 
 void LevelStore::load_morph(uint32_t asset, uint32_t slot) { find_morph(*assets_[asset], slot); }
+
+uint64_t LevelStore::fallbacks() const {
+  uint64_t sum = 0;
+  for (const auto& asset : assets_) {
+    for (uint32_t slot = 0; slot < asset->traced.slot_count(); ++slot)
+      sum += asset->fallbacks[slot].load(std::memory_order_relaxed);
+  }
+  return sum;
+}
+
+std::vector<LevelStats> LevelStore::level_stats(uint32_t asset_index) const {
+  const OpenAsset& asset = *assets_[asset_index];
+  std::vector<LevelStats> stats;
+  for (uint32_t slot = 0; slot < asset.traced.slot_count(); ++slot) {
+    const size_t item = asset.items[slot];
+    const ItemState state = levels_.state(item);
+    const ItemStats loaded = levels_.item_stats(item);
+    stats.push_back({loaded.loads, loaded.load_seconds,
+                     state == ItemState::Ready ? levels_.resident_bytes(item) : uint64_t{0},
+                     asset.fallbacks[slot].load(std::memory_order_relaxed),
+                     state == ItemState::Broken || state == ItemState::Refused});
+  }
+  return stats;
+}
 
 uint64_t LevelStore::fixed_bytes() const { return kRuntimeBytes + instance_bytes_ + table_bytes_; }
 

@@ -64,7 +64,9 @@ class LevelStore final : public LevelSource {
   void load_morph(uint32_t asset, uint32_t slot);
 
   ResidencyStats stats() const { return levels_.stats(); }
-  uint64_t fallbacks() const { return fallbacks_.load(std::memory_order_relaxed); }
+  /// Of all levels: LevelStats::fallbacks.
+  uint64_t fallbacks() const;
+  std::vector<LevelStats> level_stats(uint32_t asset) const;
 
  private:
   struct ItemOwner {
@@ -102,7 +104,6 @@ class LevelStore final : public LevelSource {
   const OpenAsset* opening_ = nullptr;
   ResidentSet levels_;
   std::atomic<bool> said_no_room_{false};
-  std::atomic<uint64_t> fallbacks_{0};    ///< relaxed: a counter
   std::atomic<uint64_t> freed_bytes_{0};  ///< since the last malloc_trim; relaxed: a counter
   LoaderThread loader_;                   ///< last: stops before anything else goes
 };

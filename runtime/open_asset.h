@@ -2,6 +2,7 @@
 // An open asset: its manifest reduced to what the runtime needs, and how its levels are loaded.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -47,6 +48,8 @@ struct OpenAsset {
   std::vector<std::string> file_names;                ///< per level, inside the folder
   std::vector<uint64_t> file_hashes;                  ///< per level, of the whole file
   std::vector<size_t> items;                          ///< per level: its number in the ResidentSet
+  /// Per level: visits of rays that asked for it, or its morph, and that another one served. Any thread.
+  std::unique_ptr<std::atomic<uint64_t>[]> fallbacks;
   std::vector<size_t> morph_items;  ///< per level: of its morph to the next; kNoItem. Empty: levels dissolve
 
   /// Heap bytes of the tables above.

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <set>
 
+#include "runtime/explain.h"
 #include "runtime/frame_planner.h"
 #include "runtime/host_scene.h"
 #include "runtime/interaction_model.h"
@@ -82,12 +83,22 @@ struct Runtime::Impl {
   /// Tells the budget what so many instances take, of which the first `with_data` have data of the host's. The room
   /// that the arrays have beyond was never touched: it is not resident.
   Result<void> count_instances(size_t count, size_t with_data) {
-    return levels.set_instance_bytes(count * bytes_per_instance(options) + with_data * sizeof(InstanceData));
+    return levels.set_instance_bytes(count * bytes_per_instance(options) + with_data * sizeof(InstanceData) +
+                                     bytes_of_motions(count));
+  }
+  Result<void> count_instances() { return count_instances(geometry.instances.size(), instance_data.size()); }
+  /// Of the motions that there are, and what the host's scene takes more for so many instances because of them.
+  uint64_t bytes_of_motions(size_t count) const {
+    return geometry.motion_bytes() == 0 ? 0 : geometry.motion_bytes() + count * kSceneBytesPerInstanceInMotion;
   }
   bool has_instance(InstanceId instance) const {
     return instance.value < geometry.instances.size() && !free_ids.contains(instance.value);
   }
   Result<InstanceRecord> make_record(uint32_t asset, const mat4x3& local_to_world) const;
+  /// An asset's transform to the world, of that of its source.
+  mat4x3 asset_to_world(uint32_t asset, const mat4x3& local_to_world) const;
+  /// Puts an instance elsewhere; its limits stay. After an error it is where it was.
+  Result<void> place(uint32_t instance, const InstanceRecord& record, std::optional<InstanceMotion> motion);
   /// What was hit; its level is null if the record is not of a hit, or the level has gone since.
   HitLevels levels_of(const HitRecord& hit) const;
 
@@ -169,9 +180,13 @@ void Runtime::bounds(AssetId asset, glm::vec3& lower, glm::vec3& upper) const {
   upper = box.upper;
 }
 
-Result<InstanceRecord> Runtime::Impl::make_record(uint32_t asset, const mat4x3& local_to_world) const {
+mat4x3 Runtime::Impl::asset_to_world(uint32_t asset, const mat4x3& local_to_world) const {
   const OpenAsset& opened = levels.asset(asset);
-  FARFIELD_TRY_LET(auto record, make_instance(asset, with_origin(local_to_world, opened.origin, opened.rotation)));
+  return with_origin(local_to_world, opened.origin, opened.rotation);
+}
+
+Result<InstanceRecord> Runtime::Impl::make_record(uint32_t asset, const mat4x3& local_to_world) const {
+  FARFIELD_TRY_LET(auto record, make_instance(asset, asset_to_world(asset, local_to_world)));
   record.footprint.world_to_r0 = options.pixel_error / largest_stretch(local_to_world);
   if (asset < asset_limits.size()) record.limits = asset_limits[asset];
   return record;
@@ -224,15 +239,46 @@ Result<void> Runtime::set_level_limits(AssetId asset, const LevelLimits& limits)
   return {};
 }
 
+Result<void> Runtime::Impl::place(uint32_t instance, const InstanceRecord& record,
+                                  std::optional<InstanceMotion> motion) {
+  const InstanceRecord former = geometry.instances[instance];
+  std::optional<InstanceMotion> former_motion = geometry.motion(instance);
+  geometry.instances[instance] = record;
+  geometry.instances[instance].limits = former.limits;
+  Result<void> is_placed = geometry.set_motion(instance, std::move(motion));
+  if (is_placed) is_placed = count_instances();
+  if (!is_placed) {
+    geometry.instances[instance] = former;
+    FARFIELD_TRY(geometry.set_motion(instance, std::move(former_motion)));
+    return is_placed;
+  }
+  planner.note_moved(instance);
+  return {};
+}
+
 Result<void> Runtime::move_instance(InstanceId instance, const glm::mat4x3& local_to_world) {
   Impl& impl = *impl_;
   if (!impl.has_instance(instance)) return no_such_instance(instance);
-  InstanceRecord& record = impl.geometry.instances[instance.value];
-  const LevelLimits limits = record.limits;
-  FARFIELD_TRY_LET(record, impl.make_record(record.asset, local_to_world));
-  record.limits = limits;
-  impl.planner.note_moved(instance.value);
-  return {};
+  const uint32_t asset = impl.geometry.instances[instance.value].asset;
+  FARFIELD_TRY_LET(const auto record, impl.make_record(asset, local_to_world));
+  return impl.place(instance.value, record, std::nullopt);
+}
+
+Result<void> Runtime::move_instance(InstanceId instance, const std::vector<glm::mat4x3>& keys) {
+  if (keys.size() == 1) return move_instance(instance, keys.front());
+  Impl& impl = *impl_;
+  if (!impl.has_instance(instance)) return no_such_instance(instance);
+  const uint32_t asset = impl.geometry.instances[instance.value].asset;
+  std::vector<mat4x3> asset_keys;
+  float stretch = 0.0f;
+  for (const mat4x3& key : keys) {
+    asset_keys.push_back(impl.asset_to_world(asset, key));
+    stretch = std::max(stretch, largest_stretch(key));
+  }
+  FARFIELD_TRY_LET(auto motion, InstanceMotion::make(asset_keys));
+  FARFIELD_TRY_LET(auto record, impl.make_record(asset, keys.front()));
+  record.footprint.world_to_r0 = impl.options.pixel_error / stretch;  // of the key that shows it largest
+  return impl.place(instance.value, record, std::move(motion));
 }
 
 Result<void> Runtime::set_visible(InstanceId instance, bool is_visible) {
@@ -246,6 +292,8 @@ Result<void> Runtime::set_visible(InstanceId instance, bool is_visible) {
 Result<void> Runtime::remove_instance(InstanceId instance) {
   Impl& impl = *impl_;
   if (!impl.has_instance(instance)) return no_such_instance(instance);
+  FARFIELD_TRY(impl.geometry.set_motion(instance.value, std::nullopt));
+  FARFIELD_TRY(impl.count_instances());
   impl.geometry.set_hidden(instance.value, true);
   impl.free_ids.insert(instance.value);
   if (instance.value < impl.instance_data.size()) impl.instance_data[instance.value] = {};
@@ -274,7 +322,21 @@ Interaction Runtime::interaction(const RTCRayHit& ray_hit, const RayContext& con
                                 "interaction() of what is no hit of ours since the last plan_frame(); it is black");
     return {};
   }
-  return make_interaction(levels, impl_->geometry.instances[context.hit.instance], ray_hit, context.hit);
+  std::optional<InstanceRecord> moved;
+  const InstanceRecord& instance = impl_->geometry.record_at(context.hit.instance, ray_hit.ray.time, moved);
+  return make_interaction(levels, instance, ray_hit, context.hit);
+}
+
+AssetId Runtime::asset_of(InstanceId instance) const {
+  return {impl_->has_instance(instance) ? impl_->geometry.instances[instance.value].asset : kNoInstance};
+}
+
+std::vector<LevelStats> Runtime::level_stats(AssetId asset) const {
+  return asset.value < impl_->levels.asset_count() ? impl_->levels.level_stats(asset.value) : std::vector<LevelStats>();
+}
+
+std::vector<RayVisit> Runtime::explain(const RTCRay& ray, const RayContext& context) const {
+  return explain_ray(impl_->geometry, ray, context);
 }
 
 Stats Runtime::stats() const {

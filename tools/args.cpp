@@ -38,6 +38,12 @@ Result<PixelSize> parse_pixel_size(std::string_view text) {
   return PixelSize{size->first, size->second};
 }
 
+Result<PixelPlace> parse_pixel_place(std::string_view text) {
+  const auto place = read_pair(text, ',', 0, 65535);
+  if (!place) return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a pixel such as 320,180", text));
+  return PixelPlace{place->first, place->second};
+}
+
 Result<uint64_t> parse_budget(std::string_view text) {
   const auto bytes = parse_bytes(text);
   if (bytes && *bytes == 0) return make_error(ErrorCode::InvalidArgument, "nothing fits 0 bytes");

@@ -19,6 +19,12 @@ struct PixelSize {
 /// Reads "640x360"; both in [1, 65536]. Errors: InvalidArgument.
 Result<PixelSize> parse_pixel_size(std::string_view text);
 
+struct PixelPlace {
+  int x = 0, y = 0;
+};
+/// Reads "320,180"; both in [0, 65535]. Errors: InvalidArgument.
+Result<PixelPlace> parse_pixel_place(std::string_view text);
+
 /// Reads a size as parse_bytes() does, but not 0. Errors: InvalidArgument.
 Result<uint64_t> parse_budget(std::string_view text);
 /// Reads a number above 0, at most 1e6. Errors: InvalidArgument.

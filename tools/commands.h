@@ -24,5 +24,6 @@ void add_render_command(CLI::App& app, Action& action);
 void add_shot_command(CLI::App& app, Action& action);
 void add_trade_command(CLI::App& app, Action& action);
 void add_sky_command(CLI::App& app, Action& action);
+void add_why_command(CLI::App& app, Action& action);
 
 }  // namespace farfield::tool

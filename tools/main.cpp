@@ -76,6 +76,7 @@ int run(int argc, char** argv) {
   tool::add_render_command(app, action);
   tool::add_shot_command(app, action);
   tool::add_trade_command(app, action);
+  tool::add_why_command(app, action);
   tool::add_sky_command(app, action);
 
   try {

@@ -7,6 +7,7 @@
 #include "tools/flags.h"
 #include "tools/memory_pools.h"
 #include "tools/render_flags.h"
+#include "tools/use_text.h"
 
 namespace farfield::tool {
 namespace {
@@ -28,6 +29,7 @@ Result<void> run_render(FrameArguments& arguments) {
   if (stdout_is_terminal() && !report->frames.empty())
     fmt::print("{}: {:.1f} s, {} of {} for assets\n", arguments.output, report->frames.back().seconds,
                format_bytes(report->peak_accounted_bytes), format_bytes(report->budget_bytes));
+  if (arguments.with_stats) fmt::print("{}", use_table(*report));
   return {};
 }
 
@@ -42,6 +44,7 @@ void add_render_command(CLI::App& app, Action& action) {
   command->add_option("--frame", arguments->frame, "Frame n is the scene at n / fps seconds, see --fps")
       ->check(CLI::Range(0, 1 << 24))
       ->capture_default_str();
+  add_stats_flag(command, *arguments);
   command->footer(
       "Example:\n  farfield render forest.glb --frame 60 --size 960x540 --spp 64 --budget 2G -o forest.exr");
   command->callback([arguments, &action] { action = [arguments] { return run_render(*arguments); }; });

@@ -34,7 +34,8 @@ void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std:
   command->add_option("scene", arguments.scene, "glTF scene: .glb or .gltf; or an OpenVDB volume: .vdb")
       ->required()
       ->check(is_named);
-  command->add_option("-o,--output", arguments.output, output_help)->required()->check(is_named);
+  if (!output_help.empty())
+    command->add_option("-o,--output", arguments.output, output_help)->required()->check(is_named);
   const auto set_size = [&options](const std::string& text) {
     const auto size = parse_pixel_size(text);
     if (!size) throw CLI::ValidationError("--size", size.error().message);
@@ -66,6 +67,11 @@ void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std:
                    "Frames per second: frame n is the scene at n / fps. Without it the rate of the animation's keys, "
                    "else 24")
       ->check(CLI::Range(0.001, 1e6));
+  command
+      ->add_option("--shutter", options.shutter,
+                   "Motion blur: for how many frames the shutter is open, the frame's own time in the middle")
+      ->check(CLI::Range(0.0, 16.0))
+      ->default_str("0");
   command->add_option("--exposure", options.exposure_stops, "Of the PNG previews, in stops")
       ->check(CLI::Range(-50.0, 50.0));
   add_parsed_option(command, "--assemblies", options.assemblies, parse_assembly_rule,
@@ -104,6 +110,11 @@ void add_level_flags(CLI::App* command, RenderOptions& options) {
   add_parsed_option(command, "--rays-per-voxel", options.rays_per_voxel, parse_rays_per_voxel,
                     "Of assets that have to be baked: what each voxel's density is measured with")
       ->default_str(fmt::format("{}", options.rays_per_voxel));
+}
+
+void add_stats_flag(CLI::App* command, RenderArguments& arguments) {
+  command->add_flag("--stats", arguments.with_stats,
+                    "Print at the end what each level of each asset did: loads, bytes, hits, how often it was missing");
 }
 
 namespace {

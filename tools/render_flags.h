@@ -18,12 +18,17 @@ struct RenderArguments {
   RenderOptions options;
   std::string scene, assets, environment, output;
   int threads = 0;
+  bool with_stats = false;  ///< print what levels did at the end
 };
 
-/// Adds the scene, -o (with `output_help`) and what the picture is of: size, samples, light, camera, assets.
+/// Adds the scene, -o (with `output_help`; none where that is empty) and what the picture is of: size, samples, light,
+/// camera, assets.
 void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std::string& output_help);
 /// Adds how coarse levels are, by budget, pixel error and bake, where the sun stands, and what else is written.
 void add_level_flags(CLI::App* command, RenderOptions& options);
+
+/// Adds --stats of commands that render.
+void add_stats_flag(CLI::App* command, RenderArguments& arguments);
 
 /// Puts the files that the flags named into the options.
 void set_files(RenderArguments& arguments);

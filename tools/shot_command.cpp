@@ -9,6 +9,7 @@
 #include "tools/flags.h"
 #include "tools/memory_pools.h"
 #include "tools/render_flags.h"
+#include "tools/use_text.h"
 
 namespace farfield::tool {
 namespace {
@@ -29,6 +30,7 @@ Result<void> run_shot(ShotArguments& arguments) {
   if (stdout_is_terminal())
     fmt::print("{}: {} frames, {} of {} for assets\n", arguments.output, report->frames.size(),
                format_bytes(report->peak_accounted_bytes), format_bytes(report->budget_bytes));
+  if (arguments.with_stats) fmt::print("{}", use_table(*report));
   return {};
 }
 
@@ -42,6 +44,7 @@ void add_shot_command(CLI::App& app, Action& action) {
   add_level_flags(command, arguments->options);
   add_parsed_option(command, "--frames", arguments->frames, parse_frame_range, "A-B[:STEP]")->required();
   command->add_option("--parent", arguments->parent, "Process to end with")->group("");  // for trade
+  add_stats_flag(command, *arguments);
   command->footer(
       "Example:\n  farfield shot forest.glb --frames 0-120:10 --size 640x360 --spp 48 --budget 500M -o shot");
   command->callback([arguments, &action] { action = [arguments] { return run_shot(*arguments); }; });

@@ -90,6 +90,8 @@ typedef struct FfInstanceData {
 FF_API FfStatus ff_add_instance(FfRuntime* runtime, uint32_t asset, const float local_to_world[12],
                                 const FfInstanceData* data, uint32_t* instance);
 FF_API FfStatus ff_move_instance(FfRuntime* runtime, uint32_t instance, const float local_to_world[12]);
+/* `count` transforms, 12 floats each: motion while the shutter is open, at evenly spaced values of RTCRay::time. */
+FF_API FfStatus ff_move_instance_keys(FfRuntime* runtime, uint32_t instance, const float* keys, size_t count);
 FF_API FfStatus ff_set_visible(FfRuntime* runtime, uint32_t instance, int is_visible);
 FF_API FfStatus ff_remove_instance(FfRuntime* runtime, uint32_t instance);
 /* Both levels included; 0 and 255: no limits. */

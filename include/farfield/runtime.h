@@ -64,6 +64,8 @@ using MessageSink = std::function<void(Severity, const std::string&)>;
 /// docs/results/scale.md].
 inline constexpr uint32_t kSceneBytesPerInstance = 120;
 inline constexpr uint32_t kSmallSceneBytesPerInstance = 64;
+/// What the budget counts beside for every instance while any of them moves with an open shutter.
+inline constexpr uint32_t kSceneBytesPerInstanceInMotion = 120;
 
 struct RuntimeOptions {
   uint64_t budget_bytes = uint64_t{1} << 32;  ///< hard: levels, heap and Embree's bytes together, build peaks included
@@ -107,6 +109,35 @@ struct PlanSummary {
   uint64_t asked_bytes = 0;            ///< a budget that gives nothing up in this frame; without morphs
   uint32_t morphs = 0;                 ///< pairs of levels that morph
   uint32_t morphs_given_up = 0;        ///< pairs that instances would see morph if they fit; they dissolve
+};
+
+/// Why a ray sees what it sees of an instance whose bounds it meets; see Runtime::explain().
+struct RayVisit {
+  InstanceId instance;
+  AssetId asset;
+  float t_entry;            ///< ray parameter at which it enters the bounds
+  float camera_footprint;   ///< world units: of a pixel on the instance, where a camera is nearest to it
+  float ray_footprint;      ///< world units: of the ray at t_entry; the wider of the two asks for a level
+  float level_0_footprint;  ///< world units: that of level 0 on this instance; level k serves what is 2^k times as wide
+  float asked_lambda;       ///< the level for the footprint, before limits and the plan
+  float lambda;             ///< the same within the instance's limits, no finer than the plan allows
+  uint32_t level;           ///< k of what this path sees
+  uint32_t next_level;      ///< k of the coarser level that it blends with; the same as level: with none
+  float blend;              ///< share of next_level: of paths that see it or, if is_morph, of the morph
+  bool is_morph;
+  bool keeps_level;         ///< the ray has left a hit on this instance, and stays on that level
+  bool is_loaded;           ///< `level` (the morph) is in memory
+  uint32_t planned_finest;  ///< k of the finest level of the asset that the plan lets rays use
+  LevelLimits limits;
+};
+
+/// What a stored level has taken and given so far; see Runtime::level_stats().
+struct LevelStats {
+  uint64_t loads = 0;           ///< reloads included
+  double load_seconds = 0;      ///< summed over loads: read, check, build
+  uint64_t resident_bytes = 0;  ///< now; 0: not in memory
+  uint64_t fallbacks = 0;       ///< visits of rays that asked for it and that a coarser level served
+  bool is_broken = false;       ///< its file could not be read, or it did not fit
 };
 
 /// Counters since create(). Thread-safe snapshot.
@@ -161,6 +192,15 @@ class FARFIELD_API Runtime {
   /// scene; nothing else is built anew. Errors: InvalidArgument (no such instance, or as for add_instance; it stays
   /// where it is).
   Result<void> move_instance(InstanceId instance, const glm::mat4x3& local_to_world);
+  /// The same, with motion while the shutter is open: where the instance is at values of RTCRay::time that are evenly
+  /// spaced from 0 to 1; in between, each entry of the transform goes linearly, as those of Embree's instances do.
+  /// 1 key: it stands still. At most 129; motions that are there together share times, as those with 2, 3, 5, 9, 17 ...
+  /// keys do. Levels are asked for by where it is nearest, and stay the same over the shutter. 48 bytes of the budget
+  /// for each key and 128 for each motion, and those that the scene takes more. Give rays that a path spawns the time
+  /// of the ray that came, and interaction() the ray that hit. Errors: InvalidArgument (no such instance; keys as for
+  /// add_instance; a way from key to key on which the instance is squeezed flat, such as half a turn in one step);
+  /// OutOfBudget. It stays where it is then.
+  Result<void> move_instance(InstanceId instance, const std::vector<glm::mat4x3>& keys);
   /// Hides an instance from all rays and plans, or shows it again; likewise. Errors: InvalidArgument (no such
   /// instance).
   Result<void> set_visible(InstanceId instance, bool is_visible);
@@ -202,6 +242,13 @@ class FARFIELD_API Runtime {
   Interaction interaction(const RTCRayHit& ray_hit, const RayContext& context) const;
 
   Stats stats() const;
+  /// The asset of an instance; of one that there is not: {kNoInstance}.
+  AssetId asset_of(InstanceId instance) const;
+  /// Per stored level of the asset, finest first, as levels() has them; none for an id that open_asset() did not give.
+  std::vector<LevelStats> level_stats(AssetId asset) const;
+  /// Which instances' bounds a ray meets, nearest first, and with which level it would deal there under the current
+  /// plan. Loads nothing; looks at every instance.
+  std::vector<RayVisit> explain(const RTCRay& ray, const RayContext& context) const;
 
  private:
   Runtime();

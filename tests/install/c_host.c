@@ -127,6 +127,7 @@ int main(int argc, char** argv) {
   FfStats stats = FF_STATS_INIT;
   const FfInstanceData data = {42, {1, 1, 1}};
   float identity[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+  const float keys[24] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1e5f};
   float lower[3], upper[3], eye[3], mean;
   uint32_t asset, instance;
   int seen;
@@ -155,6 +156,11 @@ int main(int argc, char** argv) {
   plan_and_commit(&host, eye);
   CHECK(look(&host, eye, &mean) == 0);
   identity[11] = 0;
+  CHECK(ff_move_instance(host.runtime, instance, identity) == FF_OK);
+  CHECK(ff_move_instance_keys(host.runtime, instance, keys, 2) == FF_OK);
+  plan_and_commit(&host, eye);
+  CHECK(look(&host, eye, &mean) == seen); /* rays are at time 0 */
+  CHECK(ff_move_instance_keys(host.runtime, instance, keys, 0) == FF_INVALID_ARGUMENT);
   CHECK(ff_move_instance(host.runtime, instance, identity) == FF_OK);
   CHECK(ff_set_visible(host.runtime, instance, 0) == FF_OK);
   plan_and_commit(&host, eye);

@@ -511,6 +511,48 @@ TEST_F(WholeRoad, RenderAndShotOfAScene) {
   EXPECT_EQ(contents(path("frame.exr")), of_whole_asset);
 }
 
+TEST_F(WholeRoad, WhyAPixelShowsWhatItShows) {
+  test::write_bush_scene(path("scene.gltf"), 120);
+  const auto ask = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> why = {"why",      path("scene.gltf"), "--frame",       "0",  "--size",   "48x32",
+                                    "--assets", path("assets"),     "--finest-grid", "32", "--budget", "64M"};
+    why.insert(why.end(), more.begin(), more.end());
+    return farfield(why);
+  };
+  const ProcessOutput near = ask({"--pixel", "24,16", "--json"});
+  ASSERT_EQ(near.exit_code, 0) << near.err;
+  const Json json = Json::parse(near.out);
+  ASSERT_GT(json["visits"].size(), 0u);
+  const Json& first = json["visits"][0];
+  EXPECT_EQ(first["asset"], "bush");
+  EXPECT_GE(first["level"], 0);
+  EXPECT_FALSE(first["levels"].empty());
+  int rays = 0;
+  bool is_seen = false;
+  for (const Json& hit : json["hits"]) {
+    rays += hit["rays"].get<int>();
+    is_seen |= hit["asset"] == "bush" && (hit["level"] == first["level"] || hit["level"] == first["next_level"]);
+  }
+  EXPECT_EQ(rays, json["rays"]);
+  EXPECT_TRUE(is_seen) << json["hits"];
+
+  const ProcessOutput text = ask({"--pixel", "24,16"});
+  EXPECT_NE(text.out.find("lambda"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("nothing finer: "), std::string::npos) << text.out;
+  const uint64_t planned = json["planned_bytes"];
+  const ProcessOutput poor =
+      ask({"--pixel", "24,16", "--pixel-error", "0.01", "--budget", std::to_string(planned * 9 / 10)});
+  EXPECT_NE(poor.out.find("nothing finer: the budget"), std::string::npos) << poor.out << poor.err;
+  EXPECT_NE(ask({"--pixel", "0,0"}).out.find("meets no instance's bounds"), std::string::npos);
+  expect_one_line_error(ask({"--pixel", "48,0"}), "48x32");
+
+  const ProcessOutput stats = farfield({"render", path("scene.gltf"), "--size", "24x16", "--spp", "2", "--assets",
+                                        path("assets"), "--finest-grid", "32", "--stats", "-o", path("stats.exr")});
+  EXPECT_EQ(stats.exit_code, 0);
+  EXPECT_NE(stats.out.find("served coarser"), std::string::npos) << stats.out;
+  EXPECT_NE(stats.out.find("bush"), std::string::npos) << stats.out;
+}
+
 /// A ball of fog, 16 voxels wide, about the origin.
 void write_fog_ball(const fs::path& path) {
   test::VdbGrid grid;

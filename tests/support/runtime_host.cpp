@@ -63,6 +63,10 @@ void Host::commit() {
 
 bool Host::trace(const vec3& origin, const vec3& direction, RayContext& context, EmbreeRayHit& ray_hit) const {
   ray_hit = make_ray_hit(origin, direction);
+  return trace(context, ray_hit);
+}
+
+bool Host::trace(RayContext& context, EmbreeRayHit& ray_hit) const {
   return trace_nearest(scene_.get(), context.embree, ray_hit) && ray_hit.hit.geomID == runtime_->geometry_id();
 }
 

@@ -29,6 +29,7 @@ class Host {
   void commit();
   /// The nearest hit from origin along direction. True: hit on Farfield geometry.
   bool trace(const vec3& origin, const vec3& direction, RayContext& context, EmbreeRayHit& ray_hit) const;
+  bool trace(RayContext& context, EmbreeRayHit& ray_hit) const;  ///< the same of a ray that is made already
   Interaction interaction(const EmbreeRayHit& ray_hit, const RayContext& context) const {
     return runtime_->interaction(ray_hit, context);
   }

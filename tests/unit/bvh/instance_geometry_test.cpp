@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <glm/gtc/matrix_transform.hpp>
+
 #include <limits>
 #include <map>
 #include <memory>
@@ -604,6 +606,123 @@ TEST(InstanceGeometry, AllInstancesShareLoadedLevelsAndThreadsAgree) {
     results.push_back(t);
   }
   EXPECT_EQ(results[0], results[1]);
+}
+
+// --- Motion ----------------------------------------------------------------------------------------------------------
+
+/// The transforms of an instance that turns and drifts.
+std::vector<mat4x3> random_motion(Rng& rng, size_t keys) {
+  const mat4x3 start = random_transform(rng);
+  const vec3 way = random_unit(rng), axis = random_unit(rng);
+  std::vector<mat4x3> motion;
+  for (size_t i = 0; i < keys; ++i) {
+    const float t = static_cast<float>(i) / static_cast<float>(keys - 1);
+    const mat3 turn(glm::rotate(glm::mat4(1.0f), 2.0f * t, axis));
+    motion.emplace_back(turn * start[0], turn * start[1], turn * start[2], start[3] + (t * t) * way);
+  }
+  return motion;
+}
+
+/// The level's triangles in world space as Embree moves them: as many time steps as the motions' common times.
+EmbreeGeometry flatten_in_motion(EmbreeDeviceRef device, const LevelData& level,
+                                 const std::vector<std::vector<mat4x3>>& motions, size_t steps) {
+  EmbreeGeometry geometry = new_triangles(device);
+  set_time_steps(geometry.get(), static_cast<unsigned>(steps));
+  std::vector<uvec3> triangles;
+  for (size_t step = 0; step < steps; ++step) {
+    std::vector<vec3> positions;
+    for (const std::vector<mat4x3>& keys : motions) {
+      const double place = static_cast<double>(step * (keys.size() - 1)) / static_cast<double>(steps - 1);
+      const size_t key = std::min(static_cast<size_t>(place), keys.size() - 1);
+      const auto t = static_cast<float>(place - static_cast<double>(key));
+      const auto base = static_cast<uint32_t>(positions.size());
+      for (const vec3& p : level.positions) {
+        const vec3 a = apply(keys[key], p);
+        positions.push_back(t > 0.0f ? glm::mix(a, apply(keys[key + 1], p), t) : a);
+      }
+      if (step > 0) continue;
+      for (const Quad& q : level.quads) {
+        triangles.emplace_back(base + q.v0, base + q.v1, base + q.v3);
+        if (q.is_pair()) triangles.emplace_back(base + q.v2, base + q.v3, base + q.v1);
+      }
+    }
+    copy_array<vec3>(geometry.get(), positions, static_cast<unsigned>(step));
+  }
+  copy_array<uvec3>(geometry.get(), triangles);
+  commit_geometry(geometry.get());
+  return geometry;
+}
+
+TEST(InstanceGeometry, MovesAsEmbreesOwnTrianglesDo) {
+  const LevelData level = triangle_soup(300, 0.2f, 1);
+  Stage stage;
+  const uint32_t asset = stage.add_asset({&level});
+  Rng rng(21);
+  std::vector<std::vector<mat4x3>> motions;
+  for (const size_t keys : {2, 3, 4, 5, 7, 2, 4}) {  // 12 segments together
+    motions.push_back(random_motion(rng, keys));
+    const uint32_t id = stage.add_instance(asset, motions.back().front());
+    ASSERT_TRUE(stage.geometry().set_motion(id, *InstanceMotion::make(motions.back())));
+  }
+  motions.push_back({random_transform(rng)});  // and one that stands still
+  motions.back().push_back(motions.back().front());
+  stage.add_instance(asset, motions.back().front());
+  const EmbreeSceneRef scene = stage.scene();
+  const EmbreeGeometry mesh = flatten_in_motion(stage.host_device(), level, motions, 13);
+  const EmbreeScene plain = build_static_scene(stage.host_device(), mesh);
+
+  int hits = 0, different = 0, wrong_normal = 0;
+  constexpr int kRays = 20000;
+  for (int i = 0; i < kRays; ++i) {
+    const vec3 direction = random_unit(rng);
+    const vec3 origin = 3.0f * random_unit(rng) - 3.0f * direction;
+    EmbreeRayHit a = make_ray_hit(origin, direction);
+    a.ray.time = i % 100 == 0 ? static_cast<float>(i / 100 % 2) : rng.next();
+    EmbreeRayHit b = a;
+    RayContext context;
+    EmbreeContext plain_context = make_context();
+    EmbreeRay shadow = a.ray;
+    const bool is_hit = trace_nearest(scene, context.embree, a);
+    const bool is_plain_hit = trace_nearest(plain.get(), plain_context, b);
+    trace_occlusion(scene, context.embree, shadow);
+    EXPECT_EQ(is_hit, shadow.tfar < 0.0f);
+    hits += is_plain_hit;
+    if (is_hit != is_plain_hit || (is_hit && std::abs(a.ray.tfar - b.ray.tfar) > 1e-4f * (1.0f + b.ray.tfar))) {
+      ++different;
+    } else if (is_hit) {
+      const vec3 na = glm::normalize(vec3(a.hit.Ng_x, a.hit.Ng_y, a.hit.Ng_z));
+      const vec3 nb = glm::normalize(vec3(b.hit.Ng_x, b.hit.Ng_y, b.hit.Ng_z));
+      wrong_normal += glm::dot(na, nb) < 0.999f;
+    }
+  }
+  EXPECT_GT(hits, kRays / 10);
+  EXPECT_LT(different, hits / 500);  // rays that graze an edge
+  EXPECT_LT(wrong_normal, hits / 500);
+}
+
+TEST(InstanceGeometry, MotionsShareTimesOrAreRefused) {
+  const LevelData level = triangle_soup(10, 0.2f, 1);
+  Stage stage;
+  const uint32_t asset = stage.add_asset({&level});
+  InstanceGeometry& geometry = stage.geometry();
+  for (int i = 0; i < 3; ++i) stage.add_instance(asset, mat4x3(1.0f));
+  const auto still = [](size_t keys) { return *InstanceMotion::make(std::vector<mat4x3>(keys, mat4x3(1.0f))); };
+  EXPECT_EQ(geometry.motion_bytes(), 0u);
+  ASSERT_TRUE(geometry.set_motion(0, still(129)));
+  ASSERT_TRUE(geometry.set_motion(1, still(65)));
+  const uint64_t bytes = geometry.motion_bytes();
+  EXPECT_GE(bytes, (129 + 65) * sizeof(mat4x3));
+  EXPECT_FALSE(geometry.set_motion(1, still(4)));  // 384 segments
+  EXPECT_EQ(geometry.motion_bytes(), bytes);
+  EXPECT_EQ(geometry.motion(1)->key_count(), 65u);
+  ASSERT_TRUE(geometry.set_motion(0, std::nullopt));
+  EXPECT_FALSE(geometry.motion(0));
+  EXPECT_FALSE(geometry.set_motion(2, still(4)));  // 192
+  ASSERT_TRUE(geometry.set_motion(1, still(9)));
+  EXPECT_TRUE(geometry.set_motion(2, still(4)));  // 24
+  ASSERT_TRUE(geometry.set_motion(1, std::nullopt));
+  ASSERT_TRUE(geometry.set_motion(2, std::nullopt));
+  EXPECT_EQ(geometry.motion_bytes(), 0u);
 }
 
 TEST(InstanceGeometry, BoundsContainEveryHitUnderExtremeTransforms) {

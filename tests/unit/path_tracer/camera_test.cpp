@@ -37,6 +37,22 @@ TEST(Camera, PixelXGrowsToTheRight) {
   EXPECT_GT(Camera::orthographic({0, 0, 0}, {0, 0, -1}, {0, 1, 0}, 4.0f, 10, 10).ray(9, 5).origin.x, 0.1f);
 }
 
+TEST(RayAt, GoesStraightBetweenKeys) {
+  const Camera still = perspective(40, 30);
+  const std::vector<Camera> keys = {Camera::orthographic({0, 0, 3}, {0, 0, -1}, {0, 1, 0}, 4.0f, 40, 30),
+                                    Camera::orthographic({1, 0, 3}, {0, 0, -1}, {0, 1, 0}, 4.0f, 40, 30),
+                                    Camera::orthographic({1, 6, 3}, {0, 0, -1}, {0, 1, 0}, 4.0f, 40, 30)};
+  expect_near(ray_at({&still, 1}, 7, 8, 0.9f).direction, still.ray(7, 8).direction, 0.0f + 1e-9f);
+  expect_near(ray_at(keys, 20, 15, 0.25f).origin, {0.5f, 0, 3});
+  expect_near(ray_at(keys, 20, 15, 0.5f).origin, {1, 0, 3});
+  expect_near(ray_at(keys, 20, 15, 0.75f).origin, {1, 3, 3});
+  expect_near(ray_at(keys, 20, 15, 1.0f).origin, {1, 6, 3});
+  const std::vector<Camera> turning = {still, Camera::perspective({1, 2, 3}, {2, 0, 0}, {0, 5, 1}, 1.0f, 40, 30)};
+  const CameraRay halfway = ray_at(turning, 20, 15, 0.5f);
+  expect_near(halfway.direction, glm::normalize(vec3(1, 0, -1)));
+  EXPECT_FLOAT_EQ(halfway.cone_spread, still.ray(20, 15).cone_spread);
+}
+
 TEST(Camera, ConeIsAsWideAsThePixelsDistanceOnTheSubjectsPlane) {
   // The promise of cone and tessellation camera: at the plane where two neighbouring pixels' rays meet a surface that
   // faces the camera, the cone is as wide as their points are apart.

@@ -283,6 +283,39 @@ TEST_F(PathTraceScene, ASmallSceneOfManyInstancesShowsTheSame) {
   EXPECT_EQ(values[0], values[1]);
 }
 
+// A ball of radius 1 that crosses three of its radii while the shutter is open covers what it passes for as long as it
+// does; whether it or the camera moves is the same.
+TEST_F(PathTraceScene, ShuttersBlurWhatMoves) {
+  constexpr int kSide = 240, kRows = 4;
+  constexpr float kWay = 3.0f, kWidth = 6.0f;
+  const auto camera_beside = [](float x) {
+    return Camera::orthographic({x, 0, 10}, {0, 0, -1}, {0, 1, 0}, kWidth, kSide, kRows);
+  };
+  mat4x3 right(1.0f);
+  right[3].x = kWay;
+  TraceOptions options;
+  options.samples_per_pixel = 64;
+  for (const bool does_camera_move : {true, false}) {
+    ASSERT_TRUE(runtime_->move_instance(InstanceId{0}, std::vector<mat4x3>{mat4x3(1.0f), right}));
+    std::vector<Camera> keys(3, camera_beside(0.5f * kWay));
+    if (does_camera_move) {
+      ASSERT_TRUE(runtime_->move_instance(InstanceId{0}, mat4x3(1.0f)));
+      keys = {camera_beside(0.5f * kWay), camera_beside(0.0f), camera_beside(-0.5f * kWay)};
+    }
+    runtime_->set_cameras({keys[0].tessellation(), keys[2].tessellation()});
+    ASSERT_TRUE(runtime_->plan_frame());
+    scene_ = std::move(*make_scene(device_.get(), *runtime_));
+    Film film(kSide, kRows);
+    ASSERT_TRUE(path_trace({scene_.get(), runtime_.get(), &lights_}, keys, options, film));
+    for (int x = 0; x < kSide; ++x) {
+      const float place = (static_cast<float>(x) + 0.5f) * kWidth / kSide - 0.5f * kWidth + 0.5f * kWay;
+      const float first = std::max(0.0f, (place - 1) / kWay), last = std::min(1.0f, (place + 1) / kWay);
+      EXPECT_NEAR(film.image().pixel(x, kRows / 2)[3], std::max(0.0f, last - first), 0.06f)
+          << x << " " << does_camera_move;
+    }
+  }
+}
+
 TEST_F(PathTraceScene, CancelStopsEarly) {
   Film film(256, 256);
   TraceOptions options;

@@ -130,6 +130,52 @@ TEST_F(Shot, InMapCoordinatesIsTheSamePicture) {
   EXPECT_LT(difference, 0.01 * sum);
 }
 
+// What an open shutter sees is the mean of the instants meanwhile, whether the camera moves or what it looks at.
+TEST_F(Shot, ShutterIsTheMeanOfInstants) {
+  const auto green = [&](const char* name) {
+    const auto picture = read_exr(out() / name);
+    std::vector<double> values;
+    for (int y = 0; picture && y < options_.height; ++y)
+      for (int x = 0; x < options_.width; ++x) values.push_back(value(picture->image, x, y, "G"));
+    return values;
+  };
+  options_.trace.samples_per_pixel = 64;
+  options_.sky = false;
+  options_.environment = folder_.path() / "white.exr";
+  Image white(8, 4, {"R", "G", "B"});
+  std::ranges::fill(white.values, 1.0f);
+  ASSERT_TRUE(write_exr(options_.environment, white));
+  options_.trace.transparent = true;  // the picture is the balls alone
+  for (const int animated_node : {0, 2}) {
+    const float z = animated_node == 0 ? -9.0f : 9.0f;  // the ball in front of the camera, or the camera behind it
+    const std::vector<float> floats = {-1, -1, -1, 1, 1, 1, -1, 1, 0, 0, 1, -2, 0, z, 4, 0, z};
+    test::write_bytes(folder_.path() / "scene.bin", std::as_bytes(std::span(floats)));
+    write_scene("", animated_node);
+    options_.frames_per_second = 24;
+    options_.shutter = 8.0;
+    ASSERT_TRUE(shoot({12, 12, 1}));
+    const std::vector<double> blurred = green("frame_0012.exr");
+    options_.frames_per_second = 48;
+    options_.shutter = 0;
+    std::vector<double> mean(blurred.size());
+    ASSERT_TRUE(shoot({17, 31, 2}));  // the middles of eight parts of frames 8 to 16 of before
+    for (int frame = 17; frame <= 31; frame += 2) {
+      const std::vector<double> instant = green(fmt::format("frame_{:04}.exr", frame).c_str());
+      for (size_t i = 0; i < mean.size(); ++i) mean[i] += instant[i] / 8;
+    }
+    double difference = 0, from_instant = 0, sum = 0;
+    const std::vector<double> instant = green("frame_0023.exr");
+    for (size_t i = 0; i < mean.size(); ++i) {
+      difference += std::abs(blurred[i] - mean[i]);
+      from_instant += std::abs(blurred[i] - instant[i]);
+      sum += mean[i];
+    }
+    EXPECT_GT(sum, 10) << animated_node;
+    EXPECT_LT(difference, 0.15 * sum) << animated_node;
+    EXPECT_GT(from_instant, 0.3 * sum) << animated_node;
+  }
+}
+
 TEST_F(Shot, WarningsAreSaidOnceAndInTheRecord) {
   int said = 0;
   options_.warning = [&](const std::string&) { ++said; };

@@ -21,6 +21,7 @@ FrameReport frame_report(int frame) {
   report.bias = 0.125;
   report.asked_bytes = 4321;
   report.finest_level = {1, 4};
+  report.levels = {{{1, 77, 2, 0.5, 4096, 3}, {5, 1, 0, 0.0, 128, 0}}, {}};
   report.levels_given_up = {0, 1.5f};
   return report;
 }
@@ -57,6 +58,10 @@ TEST(ShotRecord, HasTheKeysThatChecksRead) {
   EXPECT_EQ(frame["asked_bytes"], 4321);
   EXPECT_EQ(frame["levels_given_up"]["ground"], 1.5);
   EXPECT_EQ(frame["finest_level"]["ground"], 4);
+  ASSERT_EQ(frame["levels"]["maple"].size(), 2u);
+  EXPECT_EQ(frame["levels"]["maple"][0]["hits"], 77);
+  EXPECT_EQ(frame["levels"]["maple"][0]["served_coarser"], 3);
+  EXPECT_TRUE(frame["levels"]["ground"].empty());
   EXPECT_EQ(frame["degraded"], frame["fallbacks"] > 0);
   EXPECT_EQ(frame["exr_hash"], "fedcba9876543210");
   EXPECT_FALSE(json["frames"][0].contains("exr_hash"));

@@ -630,6 +630,81 @@ TEST_F(RuntimeTest, PlansFollowWhatMovesComesAndIsHidden) {
   EXPECT_FALSE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));  // all are hidden or removed
 }
 
+TEST_F(RuntimeTest, InstancesMoveWhileTheShutterIsOpen) {
+  Host host;
+  host.add(sphere(), {at({0, 0, 0}), at({0, 0, -5000})});
+  Runtime& runtime = host.runtime();
+  EXPECT_EQ(host.plan(vec3(0, 0, 5000)).finest_level[0], 5u);
+  const uint64_t bytes = runtime.stats().accounted_bytes;
+  ASSERT_TRUE(runtime.move_instance(InstanceId{1}, {at({-4, 0, 0}), at({4, 0, 0}), at({4, 8, 0})}));
+  const uint64_t motion_bytes = 3 * sizeof(mat4x3) + 128 + 2 * uint64_t{kSceneBytesPerInstanceInMotion};
+  EXPECT_EQ(runtime.stats().accounted_bytes - bytes, motion_bytes);
+  ASSERT_TRUE(runtime.set_visible(InstanceId{0}, false));
+  host.plan(vec3(0, 0, 10));
+
+  // The ball passes x = 0 at time 1/4, and stands at (4, 4) at time 3/4.
+  const auto seen_at = [&](const vec3& origin, float time) {
+    RayContext context;
+    EmbreeRayHit ray_hit = make_ray_hit(origin, {0, 0, -1});
+    ray_hit.ray.time = time;
+    host.trace(context, ray_hit);
+    return ray_hit.hit.geomID == runtime.geometry_id() ? std::optional(host.interaction(ray_hit, context))
+                                                       : std::nullopt;
+  };
+  EXPECT_TRUE(seen_at({0, 0, 10}, 0.25f));
+  EXPECT_FALSE(seen_at({0, 0, 10}, 0.0f));
+  EXPECT_FALSE(seen_at({0, 0, 10}, 0.5f));
+  const auto aside = seen_at({4.6f, 4.0f, 10}, 0.75f);
+  ASSERT_TRUE(aside);
+  EXPECT_GT(aside->geometric_normal.x, 0.4f);  // of the ball where it is then
+  EXPECT_NEAR(aside->geometric_normal.y, 0.0f, 0.2f);
+  EXPECT_FALSE(seen_at({4.6f, 4.0f, 10}, 0.25f));
+
+  for (const std::vector<mat4x3>& keys :
+       {std::vector<mat4x3>{}, {at({0, 0, 0}), mat4x3(0.0f)}, {at({0, 0, 0}), at({0, 0, 0}, -1.0f)}}) {
+    const auto moved = runtime.move_instance(InstanceId{1}, keys);
+    ASSERT_FALSE(moved);
+    EXPECT_EQ(moved.error().code, ErrorCode::InvalidArgument);
+  }
+  EXPECT_FALSE(runtime.move_instance(InstanceId{2}, {at({0, 0, 0}), at({1, 0, 0})}));
+  host.plan(vec3(0, 0, 10));
+  EXPECT_TRUE(seen_at({0, 0, 10}, 0.25f));  // it moves as before
+
+  const uint64_t in_motion = runtime.stats().accounted_bytes;
+  ASSERT_TRUE(runtime.move_instance(InstanceId{1}, at({0, 0, 0})));
+  EXPECT_EQ(in_motion - runtime.stats().accounted_bytes, motion_bytes);
+  host.plan(vec3(0, 0, 10));
+  for (const float time : {0.0f, 0.25f, 0.5f, 1.0f}) EXPECT_TRUE(seen_at({0, 0, 10}, time));
+}
+
+TEST_F(RuntimeTest, LevelsAreAskedForWhereAMovingInstanceIsNearest) {
+  Host host;
+  host.add(sphere(), {at({0, 0, -5000})});
+  EXPECT_EQ(host.plan(vec3(0, 0, 5)).finest_level[0], 5u);
+  ASSERT_TRUE(host.runtime().move_instance(InstanceId{0}, {at({0, 0, -5000}), at({0, 0, 0}), at({0, 0, -5000})}));
+  EXPECT_EQ(host.plan(vec3(0, 0, 5)).finest_level[0], 0u);
+  ASSERT_TRUE(host.runtime().move_instance(InstanceId{0}, {at({0, 0, -5000}, 0.01f), at({0, 0, -5000})}));
+  EXPECT_EQ(host.plan(vec3(0, 0, 5)).finest_level[0], 5u);
+  ASSERT_TRUE(host.runtime().remove_instance(InstanceId{0}));
+  host.plan(vec3(0, 0, 5));
+}
+
+TEST_F(RuntimeTest, MotionsCountAgainstTheBudgetAtOnce) {
+  Host host(with_budget(300 << 10));
+  host.add(sphere(), {at({0, 0, 0})});
+  Runtime& runtime = host.runtime();
+  Result<void> moved;
+  size_t count = 1;
+  for (; moved && count < 100; ++count) {
+    ASSERT_TRUE(runtime.add_instance(AssetId{0}, at({0, 0, 0})));
+    moved = runtime.move_instance(InstanceId{static_cast<uint32_t>(count)}, std::vector<mat4x3>(129, at({0, 0, 0})));
+    EXPECT_LE(runtime.stats().accounted_bytes, 300u << 10);
+  }
+  ASSERT_FALSE(moved);
+  EXPECT_EQ(moved.error().code, ErrorCode::OutOfBudget);
+  host.plan(vec3(0, 0, 10));  // what was refused stands still
+}
+
 // --- What rays see ---------------------------------------------------------------------------------------------------
 
 TEST_F(RuntimeTest, ThreadsTemperatureAndBudgetDoNotChangeWhatRaysSee) {

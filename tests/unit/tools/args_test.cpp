@@ -26,6 +26,15 @@ TEST(ParsePixelSize, RefusesEverythingElseInOneLineThatQuotesIt) {
   }
 }
 
+TEST(ParsePixelPlace, ReadsAPlaceInAPicture) {
+  const auto place = parse_pixel_place("320,0");
+  ASSERT_TRUE(place);
+  EXPECT_EQ(place->x, 320);
+  EXPECT_EQ(place->y, 0);
+  for (const char* text : {"", ",", "3", "3,", "-1,2", "1,65536", "1x2", "1,2,3", "1.5,2"})
+    EXPECT_FALSE(parse_pixel_place(text)) << text;
+}
+
 TEST(ParseLevelRange, ReadsARangeOrOneLevel) {
   const auto range = parse_level_range("2-5");
   ASSERT_TRUE(range);

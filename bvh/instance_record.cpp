@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bvh/instance_record.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace farfield {
+
+namespace {
+
+// World bounds grow by this fraction of their size and of their distance from the origin: the transform of a ray there
+// rounds by a few times 2^-24 of the coordinates it adds up.
+constexpr float kRelativePad = 1e-6f;
+// The largest coordinate that Embree takes: see is_traceable().
+constexpr float kEmbreeLargest = 1.8e18f;
+
+glm::dmat3 linear_part(const mat4x3& m) { return {glm::dvec3(m[0]), glm::dvec3(m[1]), glm::dvec3(m[2])}; }
+
+bool is_in_range(const vec3& v) { return max_component(glm::abs(v)) <= kEmbreeLargest && is_finite(v); }
+
+bool is_in_range(const glm::dvec3& v) { return is_in_range(vec3(v)); }
+
+bool is_in_range(const glm::dmat3& m) { return is_in_range(m[0]) && is_in_range(m[1]) && is_in_range(m[2]); }
+
+}  // namespace
+
+vec3 InstanceRecord::normal_to_world(const vec3& n) const {
+  return static_cast<float>(handedness) *
+         (n.x * vec3(world_to_local[0]) + n.y * vec3(world_to_local[1]) + n.z * vec3(world_to_local[2]));
+}
+
+mat3 InstanceRecord::linear_to_local() const {
+  return glm::transpose(mat3(vec3(world_to_local[0]), vec3(world_to_local[1]), vec3(world_to_local[2])));
+}
+
+void InstanceRecord::set_transform(const glm::dmat3& linear, const glm::dvec3& translation) {
+  const glm::dmat3 inverse = glm::inverse(linear);
+  const glm::dvec3 back = -(inverse * translation);
+  for (int row = 0; row < 3; ++row) {
+    world_to_local[static_cast<size_t>(row)] =
+        vec4(glm::dvec4(inverse[0][row], inverse[1][row], inverse[2][row], back[row]));
+  }
+  handedness = glm::determinant(linear) < 0.0 ? -1 : 1;
+}
+
+Result<InstanceRecord> make_instance(uint32_t asset, const mat4x3& local_to_world) {
+  const auto invalid = [](const char* why) {
+    return make_error(ErrorCode::InvalidArgument, fmt::format("the instance's transform {}", why));
+  };
+  const glm::dmat3 linear = linear_part(local_to_world);
+  const glm::dvec3 translation(local_to_world[3]);
+  if (!is_in_range(linear) || !is_in_range(translation)) return invalid("is not finite, or beyond 1.8e18");
+  const double determinant = glm::determinant(linear);
+  const glm::dmat3 inverse = glm::inverse(linear);
+  const glm::dvec3 back = -(inverse * translation);
+  if (determinant == 0.0 || !is_in_range(inverse) || !is_in_range(back)) {
+    return invalid("cannot be inverted: give every axis a length that is not zero");
+  }
+  InstanceRecord record;
+  record.asset = asset;
+  record.set_transform(linear, translation);
+  return record;
+}
+
+float largest_stretch(const mat4x3& local_to_world) {
+  // The largest eigenvalue of A^T A by its trigonometric closed form [Smith 1961].
+  const glm::dmat3 a = linear_part(local_to_world);
+  const glm::dmat3 b = glm::transpose(a) * a;
+  const double mean = (b[0][0] + b[1][1] + b[2][2]) / 3.0;
+  const double off = b[1][0] * b[1][0] + b[2][0] * b[2][0] + b[2][1] * b[2][1];
+  const glm::dvec3 diagonal(b[0][0] - mean, b[1][1] - mean, b[2][2] - mean);
+  const double spread = std::sqrt((glm::dot(diagonal, diagonal) + 2.0 * off) / 6.0);
+  if (!(spread > 0.0)) return static_cast<float>(std::sqrt(mean));
+  const double half_det = glm::determinant((b - mean * glm::dmat3(1.0)) / spread) / 2.0;
+  const double angle = std::acos(std::clamp(half_det, -1.0, 1.0)) / 3.0;
+  return static_cast<float>(std::sqrt(mean + 2.0 * spread * std::cos(angle)));
+}
+
+Box3 instance_bounds(const InstanceRecord& instance, const TracedAsset& asset) {
+  // From the rounded inverse that rays really use.
+  const glm::dmat3 to_world = glm::inverse(glm::dmat3(instance.linear_to_local()));
+  const glm::dvec3 back(instance.world_to_local[0].w, instance.world_to_local[1].w, instance.world_to_local[2].w);
+  Box3 bounds;
+  const auto extend = [&](const vec3& p) { bounds.extend(vec3(to_world * (glm::dvec3(p) - back))); };
+  if (asset.hull.empty()) {
+    for (int i = 0; i < 8; ++i) extend(asset.bounds.corner(i));
+  }
+  for (const vec3& p : asset.hull) extend(p);
+  const float far = std::max(max_component(glm::abs(bounds.lower)), max_component(glm::abs(bounds.upper)));
+  const vec3 pad(kRelativePad * (max_component(bounds.size()) + far));
+  return {bounds.lower - pad, bounds.upper + pad};
+}
+
+}  // namespace farfield
