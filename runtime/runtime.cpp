@@ -83,14 +83,13 @@ struct Runtime::Impl {
   /// Tells the budget what so many instances take, of which the first `with_data` have data of the host's. The room
   /// that the arrays have beyond was never touched: it is not resident.
   Result<void> count_instances(size_t count, size_t with_data) {
-    return levels.set_instance_bytes(count * bytes_per_instance(options) + with_data * sizeof(InstanceData) +
-                                     bytes_of_motions(count));
+    const uint64_t scene_bytes = geometry.motion_bytes() == 0
+                                     ? options.scene_bytes_per_instance
+                                     : std::max(options.scene_bytes_per_instance, kMovingSceneBytesPerInstance);
+    return levels.set_instance_bytes(count * (sizeof(InstanceRecord) + scene_bytes) + geometry.motion_bytes() +
+                                     with_data * sizeof(InstanceData));
   }
   Result<void> count_instances() { return count_instances(geometry.instances.size(), instance_data.size()); }
-  /// Of the motions that there are, and what the host's scene takes more for so many instances because of them.
-  uint64_t bytes_of_motions(size_t count) const {
-    return geometry.motion_bytes() == 0 ? 0 : geometry.motion_bytes() + count * kSceneBytesPerInstanceInMotion;
-  }
   bool has_instance(InstanceId instance) const {
     return instance.value < geometry.instances.size() && !free_ids.contains(instance.value);
   }

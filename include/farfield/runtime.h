@@ -64,8 +64,8 @@ using MessageSink = std::function<void(Severity, const std::string&)>;
 /// docs/results/scale.md].
 inline constexpr uint32_t kSceneBytesPerInstance = 120;
 inline constexpr uint32_t kSmallSceneBytesPerInstance = 64;
-/// What the budget counts beside for every instance while any of them moves with an open shutter.
-inline constexpr uint32_t kSceneBytesPerInstanceInMotion = 120;
+/// In place of either for all instances, while any of them moves with an open shutter.
+inline constexpr uint32_t kMovingSceneBytesPerInstance = 240;
 
 struct RuntimeOptions {
   uint64_t budget_bytes = uint64_t{1} << 32;  ///< hard: levels, heap and Embree's bytes together, build peaks included

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What does an instance take, how long do a plan and the host's commit, with a million of them and more, and what do
-// the flags of the host's scene change? For docs/results/scale.md. Rays look down at the field from anywhere above it;
-// each instance shows its root.
+// the flags of the host's scene and motion blur change? For docs/results/scale.md. Rays look down at the field from
+// anywhere above it; each instance shows its root.
 //
 //   build/release/bin/instance_figures ASSET.farfield [COUNT...]     without counts: 100000 and 1000000
 #include <farfield/random.h>
@@ -47,11 +47,16 @@ struct HostScene {
   const char* name;
   SceneBuild build;
   uint32_t bytes_per_instance = kSceneBytesPerInstance;
+  enum class Moving { None, One, All } moving = Moving::None;  ///< while the shutter is open
 };
-constexpr HostScene kHostScenes[] = {{"default", SceneBuild::Default},
-                                     {"compact", SceneBuild::Compact},
-                                     {"low quality", SceneBuild::Small, kSmallSceneBytesPerInstance},
-                                     {"high quality", SceneBuild::HighQuality}};
+constexpr HostScene kHostScenes[] = {
+    {"default", SceneBuild::Default},
+    {"compact", SceneBuild::Compact},
+    {"low quality", SceneBuild::Small, kSmallSceneBytesPerInstance},
+    {"high quality", SceneBuild::HighQuality},
+    {"default, one moves", SceneBuild::Default, kSceneBytesPerInstance, HostScene::Moving::One},
+    {"default, all move", SceneBuild::Default, kSceneBytesPerInstance, HostScene::Moving::All},
+    {"low quality, one moves", SceneBuild::Small, kSmallSceneBytesPerInstance, HostScene::Moving::One}};
 
 /// Nanoseconds of a ray from anywhere above a square field, steeply or along it.
 double ray_nanoseconds(EmbreeSceneRef scene, float side, float height) {
@@ -65,6 +70,7 @@ double ray_nanoseconds(EmbreeSceneRef scene, float side, float height) {
     context.ray_seed = rng.next_uint();
     EmbreeRayHit ray = make_ray_hit(side * vec3(x, 0.0f, z) + vec3(0.0f, 1.5f * height, 0.0f),
                                     glm::normalize(vec3(std::cos(turn), -0.02f - down * down, std::sin(turn))));
+    ray.ray.time = rng.next();
     trace_nearest(scene, context.embree, ray);
   }
   return 1e9 * watch.cpu() / kRays;
@@ -90,7 +96,14 @@ Result<void> measure(const char* folder, size_t count, const HostScene& kind) {
   const PeakMemory peak;
   const Stopwatch adding;
   Rng rng(2);
-  for (size_t i = 0; i < count; ++i) FARFIELD_TRY(runtime->add_instance(asset, place(rng, side)));
+  for (uint32_t i = 0; i < count; ++i) {
+    const glm::mat4x3 start = place(rng, side);
+    FARFIELD_TRY(runtime->add_instance(asset, start));
+    if (kind.moving == HostScene::Moving::None || (kind.moving == HostScene::Moving::One && i > 0)) continue;
+    glm::mat4x3 end = start;
+    end[3].x += 0.2f;
+    FARFIELD_TRY(runtime->move_instance(InstanceId{i}, {start, end}));
+  }
   const double add_seconds = adding.cpu();
   const Stopwatch planning;
   FARFIELD_TRY(runtime->plan_frame());

@@ -637,7 +637,8 @@ TEST_F(RuntimeTest, InstancesMoveWhileTheShutterIsOpen) {
   EXPECT_EQ(host.plan(vec3(0, 0, 5000)).finest_level[0], 5u);
   const uint64_t bytes = runtime.stats().accounted_bytes;
   ASSERT_TRUE(runtime.move_instance(InstanceId{1}, {at({-4, 0, 0}), at({4, 0, 0}), at({4, 8, 0})}));
-  const uint64_t motion_bytes = 3 * sizeof(mat4x3) + 128 + 2 * uint64_t{kSceneBytesPerInstanceInMotion};
+  const uint64_t motion_bytes =
+      3 * sizeof(mat4x3) + 128 + 2 * uint64_t{kMovingSceneBytesPerInstance - kSceneBytesPerInstance};
   EXPECT_EQ(runtime.stats().accounted_bytes - bytes, motion_bytes);
   ASSERT_TRUE(runtime.set_visible(InstanceId{0}, false));
   host.plan(vec3(0, 0, 10));
