@@ -264,6 +264,9 @@ uint32_t mark_of(const EmbreeContext& context) {
   return mark & ~uint32_t{RTC_INTERSECT_CONTEXT_FLAG_COHERENT};
 }
 
+/// The ray came by way of an instance of the scene. Footprints and interactions would be of the wrong space.
+bool is_nested(const EmbreeContext& context) { return context.instID[0] != kNoGeometry; }
+
 /// The RayContext of a ray, whatever the host has passed; `fallback` if that has none.
 RayContext& context_of(EmbreeContext& given, const EmbreeRay& ray, std::optional<RayContext>& fallback) {
   const uint32_t mark = mark_of(given);
@@ -331,7 +334,8 @@ bool InstanceGeometry::intersect_filtered(const Query& query, EmbreeRayHit& ray_
 
 /// Single rays with a RayContext and without filters: nothing else is asked for, and nothing else is in their way.
 bool InstanceGeometry::is_plain(unsigned ray_count, const EmbreeContext& context) const {
-  return ray_count == 1 && mark_of(context) == detail::kRayContextMark && !context.filter && !has_filters;
+  return ray_count == 1 && mark_of(context) == detail::kRayContextMark && !context.filter && !has_filters &&
+         !is_nested(context);
 }
 
 void InstanceGeometry::intersect_callback(const RTCIntersectFunctionNArguments* args) {
@@ -352,6 +356,7 @@ void InstanceGeometry::occluded_callback(const RTCOccludedFunctionNArguments* ar
 }
 
 void InstanceGeometry::intersect_others(const RTCIntersectFunctionNArguments* args) const {
+  if (is_nested(*args->context)) return source_.refuse_nested();
   const auto intersect_one = [&](EmbreeRayHit& ray_hit, bool is_single) {
     std::optional<RayContext> fallback;
     RayContext& context = context_of(*args->context, ray_hit.ray, fallback);
@@ -384,6 +389,7 @@ void InstanceGeometry::intersect_others(const RTCIntersectFunctionNArguments* ar
 }
 
 void InstanceGeometry::occlude_others(const RTCOccludedFunctionNArguments* args) const {
+  if (is_nested(*args->context)) return source_.refuse_nested();
   const auto is_occluded = [&](EmbreeRay& ray) {
     std::optional<RayContext> fallback;
     RayContext& context = context_of(*args->context, ray, fallback);

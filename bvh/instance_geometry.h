@@ -18,8 +18,8 @@
 namespace farfield {
 
 /// Instances and assets, and the callbacks that Embree calls for them. Rays may run from any thread while nobody
-/// changes the tables. Queries should pass the `embree` member of a RayContext or of RayContexts as context; the scene
-/// must not be instanced itself.
+/// changes the tables. Queries should pass the `embree` member of a RayContext or of RayContexts as context; where the
+/// scene is instanced itself, rays pass, and LevelSource::refuse_nested() is called.
 class InstanceGeometry {
  public:
   explicit InstanceGeometry(LevelSource& source) : source_(source) {}

@@ -113,6 +113,8 @@ class LevelSource {
   virtual const TracedLevel* serve(uint32_t asset, uint32_t slot) = 0;
   /// The morph from `slot` to the next; null if it or one of its levels is not there: the ray sees one of them then.
   virtual const TracedMorph* serve_morph(uint32_t /*asset*/, uint32_t /*slot*/) { return nullptr; }
+  /// Rays came by way of an instance of the scene that holds the geometry, and see nothing. Called from any thread.
+  virtual void refuse_nested() {}
 };
 
 }  // namespace farfield

@@ -49,7 +49,8 @@ std::vector<PixelLevel> levels_of(const Runtime& runtime, const RayVisit& visit)
   std::vector<PixelLevel> levels;
   for (size_t slot = 0; slot < infos.size(); ++slot) {
     levels.push_back({infos[slot].level, std::ldexp(visit.level_0_footprint, static_cast<int>(infos[slot].level)),
-                      infos[slot].resident_bytes, stats[slot].resident_bytes > 0, stats[slot].is_broken});
+                      infos[slot].resident_bytes, stats[slot].resident_bytes > 0, stats[slot].is_broken,
+                      stats[slot].is_planned});
   }
   return levels;
 }

@@ -19,6 +19,7 @@ struct PixelLevel {
   uint64_t bytes = 0;   ///< once loaded
   bool is_loaded = false;
   bool is_broken = false;
+  bool is_planned = false;  ///< rays may use it in this frame
 };
 
 /// An instance whose bounds the middle of the pixel meets.
@@ -52,7 +53,8 @@ struct PixelReport {
 /// of render_frame(); InvalidArgument (no such pixel).
 Result<PixelReport> explain_pixel(const RenderOptions& options, int frame, int x, int y);
 
-/// Why this visit sees nothing finer, in words: one sentence each, none that can be wrong.
+/// Why this visit sees the level that it sees, in words, a sentence each: why nothing finer, and why nothing coarser
+/// where it is finer than asked.
 std::vector<std::string> reasons(const PixelVisit& visit, const PixelReport& report);
 
 }  // namespace farfield

@@ -50,6 +50,13 @@ const TracedMorph* LevelStore::serve_morph(uint32_t asset_index, uint32_t slot) 
   return morph;
 }
 
+void LevelStore::refuse_nested() {
+  messages_.report_once(
+      said_nested_, Severity::Error,
+      "the scene that holds Farfield's geometry is instanced by another: rays see nothing of it there; "
+      "attach() to the scene that rays start in, with the instance's transform in local_to_world");
+}
+
 const TracedMorph* LevelStore::find_morph(OpenAsset& asset, uint32_t slot) {
   bool may_ask = true;
   const bool has_levels = find_level(asset, slot + 1, may_ask) && find_level(asset, slot, may_ask);
@@ -273,7 +280,7 @@ std::vector<LevelStats> LevelStore::level_stats(uint32_t asset_index) const {
     stats.push_back({loaded.loads, loaded.load_seconds,
                      state == ItemState::Ready ? levels_.resident_bytes(item) : uint64_t{0},
                      asset.fallbacks[slot].load(std::memory_order_relaxed),
-                     state == ItemState::Broken || state == ItemState::Refused});
+                     state == ItemState::Broken || state == ItemState::Refused, asset.traced.is_usable(slot)});
   }
   return stats;
 }

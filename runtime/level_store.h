@@ -31,6 +31,7 @@ class LevelStore final : public LevelSource {
   // Rays
   const TracedLevel* serve(uint32_t asset, uint32_t slot) override;
   const TracedMorph* serve_morph(uint32_t asset, uint32_t slot) override;
+  void refuse_nested() override;
 
   // Between frames
   /// The asset in a (canonical) folder, opened with its root if it is not yet. Errors: those of Runtime::open_asset.
@@ -104,6 +105,7 @@ class LevelStore final : public LevelSource {
   const OpenAsset* opening_ = nullptr;
   ResidentSet levels_;
   std::atomic<bool> said_no_room_{false};
+  std::atomic<bool> said_nested_{false};
   std::atomic<uint64_t> freed_bytes_{0};  ///< since the last malloc_trim; relaxed: a counter
   LoaderThread loader_;                   ///< last: stops before anything else goes
 };

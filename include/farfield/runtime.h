@@ -138,6 +138,7 @@ struct LevelStats {
   uint64_t resident_bytes = 0;  ///< now; 0: not in memory
   uint64_t fallbacks = 0;       ///< visits of rays that asked for it and that a coarser level served
   bool is_broken = false;       ///< its file could not be read, or it did not fit
+  bool is_planned = false;      ///< rays may use it under the current plan
 };
 
 /// Counters since create(). Thread-safe snapshot.
@@ -231,9 +232,9 @@ class FARFIELD_API Runtime {
 
   /// Puts the user geometry into the host's scene and returns its geomID; the host commits the scene. Call again after
   /// adding instances. All instances are primitives of this one geometry: primID is InstanceId::value. The scene is
-  /// retained until the next attach() to another one, which takes the geometry out of it; it must not be instanced, and
-  /// must not be traced or committed once the Runtime is gone. After an error nothing has changed. Errors:
-  /// InvalidArgument (no scene, or one of another device), Io (what Embree says).
+  /// retained until the next attach() to another one, which takes the geometry out of it; rays that reach it through an
+  /// instance of it see nothing, which is said; it must not be traced or committed once the Runtime is gone. After an
+  /// error nothing has changed. Errors: InvalidArgument (no scene, or one of another device), Io (what Embree says).
   Result<unsigned> attach(RTCScene scene);
   unsigned geometry_id() const;
 

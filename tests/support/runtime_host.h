@@ -22,6 +22,7 @@ class Host {
   explicit Host(RuntimeOptions options = {});
   Runtime& runtime() { return *runtime_; }
   EmbreeDeviceRef device() { return device_.get(); }
+  EmbreeSceneRef scene() { return scene_.get(); }  ///< after plan()
   /// Opens, adds one instance per transform. Fails the test on errors.
   AssetId add(const std::filesystem::path& folder, const std::vector<mat4x3>& transforms = {mat4x3(1.0f)});
   /// Plans for one camera at `position` and commits the scene.

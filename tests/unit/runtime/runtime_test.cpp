@@ -941,6 +941,30 @@ TEST_F(RuntimeTest, InteractionsSayWhatTheirLightMeets) {
   }
 }
 
+TEST_F(RuntimeTest, ScenesThatAreInstancedAreRefusedInWords) {
+  Host host;
+  host.add(sphere());
+  host.plan();
+  const EmbreeScene outer = new_scene(host.device());
+  const EmbreeGeometry instance(rtcNewGeometry(host.device(), RTC_GEOMETRY_TYPE_INSTANCE));
+  rtcSetGeometryInstancedScene(instance.get(), host.scene());
+  const float shifted[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 5, 0, 0};
+  rtcSetGeometryTransform(instance.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, shifted);
+  commit_geometry(instance.get());
+  attach_geometry(outer.get(), instance.get());
+  commit_scene(outer.get());
+  for (int i = 0; i < 3; ++i) {
+    RayContext context;
+    EmbreeRayHit hit = make_ray_hit({5, 0, 10}, {0, 0, -1});
+    EmbreeRay shadow = hit.ray;
+    EXPECT_FALSE(trace_nearest(outer.get(), context.embree, hit));
+    EXPECT_FALSE(trace_occlusion(outer.get(), context.embree, shadow));
+    EXPECT_TRUE(host.trace({0, 0, 10}, {0, 0, -1}, context, hit));  // the scene itself goes on to be seen
+  }
+  ASSERT_EQ(host.messages.size(), 1u);
+  EXPECT_NE(host.messages[0].find("instanced"), std::string::npos) << host.messages[0];
+}
+
 TEST_F(RuntimeTest, HitsThatAreNotOursOrHaveGoneAreBlackAndSaidOnce) {
   Host host;
   host.add(sphere());
