@@ -13,11 +13,6 @@ namespace farfield {
 
 namespace {
 
-const PixelLevel* find_level(const PixelVisit& visit, uint32_t level) {
-  const auto found = std::ranges::find(visit.levels, level, &PixelLevel::level);
-  return found != visit.levels.end() ? &*found : nullptr;
-}
-
 /// The coarsest stored level that is as fine as asked, or the finest that there is.
 const PixelLevel& asked_level(const PixelVisit& visit) {
   const PixelLevel* asked = &visit.levels.front();
@@ -41,23 +36,26 @@ std::vector<std::string> reasons(const PixelVisit& of_visit, const PixelReport& 
   const RayVisit& visit = of_visit.visit;
   const PixelLevel& asked = asked_level(of_visit);
   std::vector<std::string> why;
-  if (visit.level == of_visit.levels.front().level) why.push_back("it is the finest level that there is");
+  const auto say = [&]<typename... Values>(fmt::format_string<const Values&...> text, const Values&... values) {
+    why.push_back(fmt::format(text, values...));
+  };
   if (visit.limits.finest > 0 || visit.limits.coarsest < LevelLimits().coarsest)
-    why.push_back(fmt::format("its levels are held between {} and {}", visit.limits.finest, visit.limits.coarsest));
-  if (of_visit.levels_given_up > 0 && visit.planned_finest > asked.level) {
-    why.push_back(fmt::format(
-        "the budget: level {} is asked for, and the plan of {} begins at level {}; a budget of {} would do",
-        asked.level, format_bytes(report.budget_bytes), visit.planned_finest, format_bytes(report.asked_bytes)));
-  } else if (visit.level > asked.level && visit.level == visit.planned_finest) {
-    why.push_back(fmt::format("level {} does not pay: the plan has level {} in its place", asked.level, visit.level));
-  }
-  if (asked.is_broken)
-    why.push_back(fmt::format("level {} could not be loaded, or did not fit; see the warnings", asked.level));
-  if (visit.level > of_visit.levels.front().level && visit.level <= asked.level) {
-    const PixelLevel* level = find_level(of_visit, visit.level);
-    why.push_back(fmt::format("none is asked for: a pixel is {:.3g} wide there, and level {} serves from {:.3g} on",
-                              std::max(visit.camera_footprint, visit.ray_footprint), visit.level,
-                              level ? level->footprint : 0.0f));
+    say("its levels are held between {} and {}", visit.limits.finest, visit.limits.coarsest);
+  if (asked.is_broken) say("level {} could not be loaded, or did not fit; see the warnings", asked.level);
+  if (visit.level == of_visit.levels.front().level) say("nothing finer: it is the finest level that there is");
+  if (visit.level < asked.level && !asked.is_planned && !asked.is_broken) {
+    say("finer than asked: level {} is not in the plan, as it would cost rays more than level {}, or take memory for "
+        "nothing",
+        asked.level, visit.level);
+  } else if (of_visit.levels_given_up > 0 && visit.planned_finest > asked.level) {
+    say("nothing finer: the budget. Level {} is asked for, and the plan of {} begins at level {}; {} would do",
+        asked.level, format_bytes(report.budget_bytes), visit.planned_finest, format_bytes(report.asked_bytes));
+  } else if (visit.level > asked.level) {
+    say("coarser than asked: level {} does not pay, and the plan has level {} in its place", asked.level, visit.level);
+  } else if (visit.level > of_visit.levels.front().level) {
+    say("nothing finer is asked for: a pixel is {:.3g} wide there, and level {} serves from {:.3g} on",
+        std::max(visit.camera_footprint, visit.ray_footprint), visit.level,
+        std::ldexp(visit.level_0_footprint, static_cast<int>(visit.level)));
   }
   return why;
 }

@@ -35,9 +35,10 @@ std::string level_list(const PixelVisit& visit) {
   for (const PixelLevel& level : visit.levels) {
     text += fmt::format("{}{} (from {:.3g}, {}{})", text.empty() ? "" : ", ", level.level, level.footprint,
                         format_bytes(level.bytes),
-                        level.is_broken   ? ", broken"
-                        : level.is_loaded ? ", loaded"
-                                          : "");
+                        level.is_broken    ? ", broken"
+                        : level.is_loaded  ? ", loaded"
+                        : level.is_planned ? ""
+                                           : ", not in the plan");
   }
   return text;
 }
@@ -62,7 +63,7 @@ std::string visit_text(const PixelVisit& of_visit, const PixelReport& report) {
       visit.camera_footprint, visit.ray_footprint, visit.asked_lambda);
   text += fmt::format("  levels, and how wide the pixels are that they serve: {}\n", level_list(of_visit));
   text += fmt::format("  seen: {}\n", seen_level(visit));
-  for (const std::string& reason : reasons(of_visit, report)) text += fmt::format("  nothing finer: {}\n", reason);
+  for (const std::string& reason : reasons(of_visit, report)) text += fmt::format("  {}\n", reason);
   return text;
 }
 
@@ -74,6 +75,7 @@ Json to_json(const PixelVisit& of_visit, const PixelReport& report) {
                       {"footprint", level.footprint},
                       {"bytes", level.bytes},
                       {"loaded", level.is_loaded},
+                      {"planned", level.is_planned},
                       {"broken", level.is_broken}});
   }
   return {{"asset", of_visit.asset},
