@@ -50,12 +50,13 @@ std::vector<std::string> reasons(const PixelVisit& of_visit, const PixelReport& 
   } else if (of_visit.levels_given_up > 0 && visit.planned_finest > asked.level) {
     say("nothing finer: the budget. Level {} is asked for, and the plan of {} begins at level {}; {} would do",
         asked.level, format_bytes(report.budget_bytes), visit.planned_finest, format_bytes(report.asked_bytes));
-  } else if (visit.level > asked.level) {
+  } else if (visit.level > asked.level && !asked.is_planned) {
     say("coarser than asked: level {} does not pay, and the plan has level {} in its place", asked.level, visit.level);
   } else if (visit.level > of_visit.levels.front().level) {
-    say("nothing finer is asked for: a pixel is {:.3g} wide there, and level {} serves from {:.3g} on",
+    say("nothing finer is asked for: a pixel is {:.3g} wide there, and level {} serves from {:.3g} on{}",
         std::max(visit.camera_footprint, visit.ray_footprint), visit.level,
-        std::ldexp(visit.level_0_footprint, static_cast<int>(visit.level)));
+        std::ldexp(visit.level_0_footprint, static_cast<int>(visit.level)),
+        visit.blend > 0 ? ", after having blended with the finer one" : "");
   }
   return why;
 }
