@@ -304,6 +304,8 @@ class WithoutFilter {
 
 }  // namespace
 
+bool is_of_ray_context(const EmbreeContext& context) { return mark_of(context) == detail::kRayContextMark; }
+
 /// The nearest hit in the instance that the host's filters accept.
 bool InstanceGeometry::intersect_filtered(const Query& query, EmbreeRayHit& ray_hit, HitRecord* record) const {
   RayContext& context = query.context;
@@ -334,8 +336,7 @@ bool InstanceGeometry::intersect_filtered(const Query& query, EmbreeRayHit& ray_
 
 /// Single rays with a RayContext and without filters: nothing else is asked for, and nothing else is in their way.
 bool InstanceGeometry::is_plain(unsigned ray_count, const EmbreeContext& context) const {
-  return ray_count == 1 && mark_of(context) == detail::kRayContextMark && !context.filter && !has_filters &&
-         !is_nested(context);
+  return ray_count == 1 && is_of_ray_context(context) && !context.filter && !has_filters && !is_nested(context);
 }
 
 void InstanceGeometry::intersect_callback(const RTCIntersectFunctionNArguments* args) {

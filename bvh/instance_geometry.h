@@ -17,6 +17,9 @@
 
 namespace farfield {
 
+/// The context is that of a RayContext, as its constructor has made it: not if somebody has overwritten its flags.
+bool is_of_ray_context(const EmbreeContext& context);
+
 /// Instances and assets, and the callbacks that Embree calls for them. Rays may run from any thread while nobody
 /// changes the tables. Queries should pass the `embree` member of a RayContext or of RayContexts as context; where the
 /// scene is instanced itself, rays pass, and LevelSource::refuse_nested() is called.

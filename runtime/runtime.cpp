@@ -110,7 +110,7 @@ struct Runtime::Impl {
   std::vector<LevelLimits> asset_limits;    ///< per asset, up to the last that has any
   std::vector<InstanceData> instance_data;  ///< per instance, up to the last one that has any
   std::set<uint32_t> free_ids;              ///< of instances that were removed: the lowest is the next one's
-  std::atomic<bool> said_stale_hit{false};
+  std::atomic<bool> said_stale_hit{false}, said_flags{false};
 };
 
 HitLevels Runtime::Impl::levels_of(const HitRecord& hit) const {
@@ -315,10 +315,18 @@ Result<unsigned> Runtime::attach(RTCScene scene) { return impl_->host.attach(sce
 unsigned Runtime::geometry_id() const { return impl_->host.geometry_id(); }
 
 Interaction Runtime::interaction(const RTCRayHit& ray_hit, const RayContext& context) const {
-  const HitLevels levels = impl_->levels_of(context.hit);
+  if (!is_of_ray_context(context.embree)) {
+    impl_->messages.report_once(impl_->said_flags, Severity::Error,
+                                "interaction() with a RayContext whose embree.flags were overwritten, perhaps by "
+                                "rtcInitIntersectContext: nothing is known of its hits; they are black");
+    return {};
+  }
+  const bool is_of_this_ray = context.hit.instance == ray_hit.hit.primID;
+  const HitLevels levels = is_of_this_ray ? impl_->levels_of(context.hit) : HitLevels();
   if (!levels.level) {
     impl_->messages.report_once(impl_->said_stale_hit, Severity::Error,
-                                "interaction() of what is no hit of ours since the last plan_frame(); it is black");
+                                "interaction() of what is no hit of ours since the last plan_frame(), or of another "
+                                "query than its context; it is black");
     return {};
   }
   std::optional<InstanceRecord> moved;

@@ -239,7 +239,8 @@ class FARFIELD_API Runtime {
   unsigned geometry_id() const;
 
   /// The interaction of a hit: ray_hit and context as rtcIntersect1 left them, hit.geomID == geometry_id(). A hit that
-  /// is not ours, or from before the last plan_frame() and gone since, is an Interaction of Kind::None, said once.
+  /// is not ours, of another query than the context's, or from before the last plan_frame() and gone since, is an
+  /// Interaction of Kind::None, said once; so is one whose context has had its flags overwritten.
   Interaction interaction(const RTCRayHit& ray_hit, const RayContext& context) const;
 
   Stats stats() const;

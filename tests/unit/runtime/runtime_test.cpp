@@ -1005,6 +1005,25 @@ TEST_F(RuntimeTest, HitsThatAreNotOursOrHaveGoneAreBlackAndSaidOnce) {
   EXPECT_EQ(host.messages.size(), 1u);
 }
 
+TEST_F(RuntimeTest, HitsOfAnotherQueryThanTheContextsAreBlack) {
+  Host host;
+  host.add(sphere(), {at({0, 0, 0}), at({5, 0, 0})});
+  host.plan();
+  RayContext first, second;
+  EmbreeRayHit hit, other;
+  ASSERT_TRUE(host.trace({0, 0, 10}, {0, 0.01f, -1}, first, hit));
+  ASSERT_TRUE(host.trace({5, 0, 10}, {0, 0.01f, -1}, second, other));
+  EXPECT_EQ(host.interaction(hit, first).kind, Interaction::Kind::Surface);
+  EXPECT_EQ(host.interaction(hit, second).kind, Interaction::Kind::None);
+  // A used context whose flags are lost is answered as a foreign one: its record is of the query before.
+  rtcInitIntersectContext(&first.embree);
+  ASSERT_TRUE(host.trace({5, 0, 10}, {0, 0.01f, -1}, first, other));
+  EXPECT_EQ(host.interaction(other, first).kind, Interaction::Kind::None);
+  ASSERT_EQ(host.messages.size(), 2u);
+  EXPECT_NE(host.messages[0].find("another query"), std::string::npos) << host.messages[0];
+  EXPECT_NE(host.messages[1].find("flags"), std::string::npos) << host.messages[1];
+}
+
 TEST_F(RuntimeTest, UnknownAssetsHaveNoLevelsAndNoBounds) {
   Host host;
   const AssetId unknown{7};
