@@ -4,9 +4,10 @@
 //
 //   build/release/bin/origin_figures ASSET.farfield
 //
-// Rays come from all around with footprints of half a level above each stored one, and leave into the hemisphere of the
-// geometric normal, diffusely. Acne: the next hit is nearer than a quarter of that level's resolution. Leak: it is on
-// the inside of a face, so that the ray has set out beneath the surface. Both in percent of rays that leave surfaces.
+// Rays come from all around at a lambda of half a level above each stored one, and leave into the hemisphere of the
+// geometric normal, diffusely; those of which the level is chosen anew are another path's to the blend. Acne: the next
+// hit is nearer than a quarter of that level's resolution. Leak: it is on the inside of a face, so that the ray has set
+// out beneath the surface. Both in percent of rays that leave surfaces.
 #include <farfield/random.h>
 #include <farfield/runtime.h>
 #include <fmt/format.h>
@@ -47,10 +48,11 @@ struct Scene {
   float radius;
 };
 
-Result<Scene> open(EmbreeDeviceRef device, const char* folder, Blend blend) {
+Result<Scene> open(EmbreeDeviceRef device, const char* folder, Blend blend, float lambda) {
   RuntimeOptions options;
   options.budget_bytes = uint64_t{16} << 30;
   options.blend = blend;
+  options.forced_lambda = lambda;
   Scene scene;
   FARFIELD_TRY_LET(scene.runtime, Runtime::create(device, options));
   FARFIELD_TRY_LET(const AssetId asset, scene.runtime->open_asset(folder));
@@ -58,7 +60,6 @@ Result<Scene> open(EmbreeDeviceRef device, const char* folder, Blend blend) {
   glm::vec3 lower, upper;
   scene.runtime->bounds(asset, lower, upper);
   scene.center = 0.5f * (lower + upper), scene.radius = 0.5f * glm::length(upper - lower);
-  scene.runtime->set_cameras({{scene.center, 0.0f, 0.0f}});  // as fine as need be: rays ask by their cones
   FARFIELD_TRY(scene.runtime->plan_frame());
   scene.embree = new_scene(device);
   FARFIELD_TRY(scene.runtime->attach(scene.embree.get()));
@@ -66,14 +67,13 @@ Result<Scene> open(EmbreeDeviceRef device, const char* folder, Blend blend) {
   return scene;
 }
 
-Counts count(const Scene& scene, float footprint, float near, bool keeps_level) {
+Counts count(const Scene& scene, float near, bool keeps_level) {
   Counts counts;
   for (int i = 0; i < kRays; ++i) {
     Rng rng(static_cast<uint64_t>(i));
     const glm::vec3 eye = scene.center + 2 * scene.radius * on_sphere(rng);
     const glm::vec3 target = scene.center + 0.7f * scene.radius * on_sphere(rng);
     RayContext context;
-    context.cone_width = footprint;
     context.path_seed = rng.next_uint(), context.ray_seed = rng.next_uint();
     EmbreeRayHit seen = make_ray_hit(eye, glm::normalize(target - eye));
     if (!trace_nearest(scene.embree.get(), context.embree, seen)) continue;
@@ -81,7 +81,6 @@ Counts count(const Scene& scene, float footprint, float near, bool keeps_level) 
     if (hit.kind != Interaction::Kind::Surface) continue;
     const glm::vec3 direction = glm::normalize(hit.geometric_normal + 0.999f * on_sphere(rng));
     RayContext leaving;
-    leaving.cone_width = 2 * footprint;  // a level coarser, as diffuse rays soon ask for
     leaving.path_seed = keeps_level ? context.path_seed : rng.next_uint();
     leaving.ray_seed = rng.next_uint();
     if (keeps_level) leaving.set_origin(context.hit);
@@ -95,14 +94,15 @@ Counts count(const Scene& scene, float footprint, float near, bool keeps_level) 
 
 Result<void> print_all(const char* folder) {
   FARFIELD_TRY_LET(const auto device, make_embree_device());
-  FARFIELD_TRY_LET(const Scene dissolving, open(device.get(), folder, Blend::Dissolve));
-  FARFIELD_TRY_LET(const Scene morphing, open(device.get(), folder, Blend::Morph));
+  FARFIELD_TRY_LET(const Scene source, open(device.get(), folder, Blend::Dissolve, 0.0f));
   fmt::print("| lambda | kept: acne / leak | kept, morph | chosen anew |\n|---|---|---|---|\n");
-  for (const LevelInfo& level : dissolving.runtime->levels(AssetId{0})) {
+  for (const LevelInfo& level : source.runtime->levels(AssetId{0})) {
     if (level.triangles == 0) break;
-    const float footprint = std::sqrt(2.0f) * level.resolution, near = 0.25f * level.resolution;
-    fmt::print("| {}.5 | {} | {} | {} |\n", level.level, count(dissolving, footprint, near, true).text(),
-               count(morphing, footprint, near, true).text(), count(dissolving, footprint, near, false).text());
+    const float lambda = static_cast<float>(level.level) + 0.5f, near = 0.25f * level.resolution;
+    FARFIELD_TRY_LET(const Scene dissolving, open(device.get(), folder, Blend::Dissolve, lambda));
+    FARFIELD_TRY_LET(const Scene morphing, open(device.get(), folder, Blend::Morph, lambda));
+    fmt::print("| {} | {} | {} | {} |\n", lambda, count(dissolving, near, true).text(),
+               count(morphing, near, true).text(), count(dissolving, near, false).text());
     std::fflush(stdout);
   }
   return {};
