@@ -11,7 +11,6 @@
 
 #include "base/file_io.h"
 #include "base/hash.h"
-#include "base/module_loader.h"
 #include "import/volume_module.h"
 
 namespace farfield {
@@ -20,15 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array<char, 8> kVdbMagic = {' ', 'B', 'D', 'V', 0, 0, 0, 0};
-
-Result<const VolumeModule*> volume_module() {
-  static const Result<const void*> entry = [] {
-    constexpr ModuleName kName{"farfield_volumes.so", kVolumeModuleEntry, "volumes cannot be read"};
-    return load_module(kName, module_folders());
-  }();
-  if (!entry) return tl::unexpected(entry.error());
-  return static_cast<const VolumeModule*>(*entry);
-}
 
 Result<void> check_options(const FogOptions& options) {
   const auto invalid = [](const std::string& what) { return make_error(ErrorCode::InvalidArgument, what); };

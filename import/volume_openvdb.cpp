@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The module farfield_volumes: OpenVDB files [Museth 2013]. Nothing of OpenVDB leaves this file; what it throws ends
-// here as an Error.
+// The module farfield_volumes, and what reads OpenVDB files [Museth 2013]. Nothing of OpenVDB leaves this file; what it
+// throws ends here as an Error.
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
@@ -15,6 +15,7 @@
 
 #include "farfield/export.h"
 #include "import/volume_module.h"
+#include "import/volume_write_openvdb.h"
 
 namespace farfield {
 namespace {
@@ -34,6 +35,15 @@ std::string coordinate_text(const Coord& c) { return fmt::format("({}, {}, {})",
 bool is_emission(std::string name) {
   for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return std::ranges::find(kEmissionNames, name) != kEmissionNames.end();
+}
+
+/// "_level_3" of "density_level_3", a grid of several levels as OpenVDB's tools and ours name them; else nothing.
+std::string level_suffix(const std::string& name) {
+  constexpr std::string_view kMark = "_level_";
+  const size_t at = name.rfind(kMark);
+  const bool has_number = at != std::string::npos && at + kMark.size() < name.size() &&
+                          name.find_first_not_of("0123456789", at + kMark.size()) == std::string::npos;
+  return has_number ? name.substr(at) : "";
 }
 
 bool is_scalar(const openvdb::GridBase& grid) { return grid.valueType() == "float" || grid.valueType() == "double"; }
@@ -407,10 +417,11 @@ class VdbReader {
       volume_.albedo = *options_.albedo;
       return {};
     }
+    const std::string suffix = level_suffix(density.getName());
     openvdb::GridBase::Ptr header;
     for (const char* name : kAlbedoNames)
       for (const auto& grid : contents_.grids)
-        if (!header && grid->getName() == name && grid->valueType() == "vec3s") header = grid;
+        if (!header && grid->getName() == name + suffix && grid->valueType() == "vec3s") header = grid;
     if (!header) {
       volume_.albedo = vec3(kDefaultAlbedo);
       warn("it says no albedo: {} is taken, --albedo says another", kDefaultAlbedo);
@@ -530,5 +541,6 @@ Result<SourceVolume> read(const std::string& path, const FogOptions& options, co
 }  // namespace
 }  // namespace farfield
 
-extern "C" FARFIELD_API const farfield::VolumeModule farfield_volume_module_1;
-const farfield::VolumeModule farfield_volume_module_1 = {farfield::read_extent, farfield::read};
+extern "C" FARFIELD_API const farfield::VolumeModule farfield_volume_module_2;
+const farfield::VolumeModule farfield_volume_module_2 = {farfield::read_extent, farfield::read,
+                                                         farfield::write_openvdb};
