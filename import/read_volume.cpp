@@ -20,6 +20,16 @@ namespace fs = std::filesystem;
 
 constexpr std::array<char, 8> kVdbMagic = {' ', 'B', 'D', 'V', 0, 0, 0, 0};
 
+Result<void> check_exists(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status)) return make_error(ErrorCode::NotFound, fmt::format("{}: no such file", path.string()));
+  if (fs::is_regular_file(status)) return {};
+  return make_error(ErrorCode::Io, fmt::format("{}: is not a regular file", path.string()));
+}
+
+}  // namespace
+
 Result<void> check_options(const FogOptions& options) {
   const auto invalid = [](const std::string& what) { return make_error(ErrorCode::InvalidArgument, what); };
   if (!(options.density_scale > 0) || !std::isfinite(options.density_scale))
@@ -32,16 +42,6 @@ Result<void> check_options(const FogOptions& options) {
     return invalid(fmt::format("--albedo must be from 0 to 1, not {},{},{}", albedo.x, albedo.y, albedo.z));
   return {};
 }
-
-Result<void> check_exists(const fs::path& path) {
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (!fs::exists(status)) return make_error(ErrorCode::NotFound, fmt::format("{}: no such file", path.string()));
-  if (fs::is_regular_file(status)) return {};
-  return make_error(ErrorCode::Io, fmt::format("{}: is not a regular file", path.string()));
-}
-
-}  // namespace
 
 std::string canonical_text(const FogOptions& options) {
   std::string text;

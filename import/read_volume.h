@@ -37,6 +37,9 @@ Result<VolumeExtent> read_volume_extent(const std::filesystem::path& path, const
 Result<SourceVolume> read_volume(const std::filesystem::path& path, const FogOptions& options = {},
                                  const Job& job = {});
 
+/// Errors: InvalidArgument, naming the option as the command calls it.
+Result<void> check_options(const FogOptions& options);
+
 /// The source_hash that read_volume() would give. Errors: those of reading the file.
 Result<uint64_t> hash_volume(const std::filesystem::path& path, const FogOptions& options);
 

@@ -16,6 +16,7 @@
 #include "farfield/export.h"
 #include "import/volume_module.h"
 #include "import/volume_write_openvdb.h"
+#include "import/voxel_shape.h"
 
 namespace farfield {
 namespace {
@@ -23,7 +24,6 @@ namespace {
 using openvdb::Coord;
 using openvdb::CoordBBox;
 
-constexpr double kCubeTolerance = 1e-4;  ///< of a voxel's edges' lengths, and of the cosines between them
 constexpr double kSmallNegative = 1e-3;  ///< of the largest density: what filters leave behind, not an error
 constexpr uint64_t kMostTableBricks = uint64_t{1} << 26;  ///< the table of a level takes 4 bytes for each
 constexpr uint64_t kMostVoxels = 0xfffffff0ull;           ///< of a level: payload indices have 32 bits
@@ -199,31 +199,20 @@ class VdbReader {
     }
     Lattice lattice{affine->getMat4()};
     std::array<dvec3, 3> edges;
-    std::array<double, 3> lengths;
     for (int axis = 0; axis < 3; ++axis) {  // rows: OpenVDB's vectors stand on the left
       const auto& m = lattice.index_to_source;
-      const auto a = static_cast<size_t>(axis);
-      edges[a] = {m(axis, 0), m(axis, 1), m(axis, 2)};
-      lengths[a] = glm::length(edges[a]);
-      if (!std::isfinite(lengths[a]) || !(lengths[a] > 0))
-        return error(ErrorCode::BadFile, "the transform of the grid \"{}\" is singular or not finite", grid.getName());
+      edges[static_cast<size_t>(axis)] = {m(axis, 0), m(axis, 1), m(axis, 2)};
     }
-    const double size = std::cbrt(lengths[0] * lengths[1] * lengths[2]);
-    for (size_t a = 0; a < 3; ++a) {
-      const size_t b = (a + 1) % 3;
-      const bool is_edge_of_cube = std::abs(lengths[a] - size) <= kCubeTolerance * size;
-      const bool is_upright = std::abs(glm::dot(edges[a], edges[b])) <= kCubeTolerance * lengths[a] * lengths[b];
-      if (is_edge_of_cube && is_upright) continue;
+    const VoxelShape shape = voxel_shape(edges);
+    if (shape.is_singular)
+      return error(ErrorCode::BadFile, "the transform of the grid \"{}\" is singular or not finite", grid.getName());
+    if (!shape.is_cube()) {
       return error(ErrorCode::Unsupported,
-                   "voxels of the grid \"{}\" are {} x {} x {}{}: only cubes are read; resample it to uniform voxels",
-                   grid.getName(), lengths[0], lengths[1], lengths[2], is_upright ? "" : ", sheared");
+                   "voxels of the grid \"{}\" are {}: only cubes are read; resample it to uniform voxels",
+                   grid.getName(), shape.other_shape);
     }
-    lattice.voxel_size = size;
-    // Exactly upright, and exactly the identity for a grid that is not turned.
-    const dvec3 x = edges[0] / lengths[0];
-    const dvec3 y = glm::normalize(edges[1] - glm::dot(edges[1], x) * x);
-    const double side = glm::dot(glm::cross(x, y), edges[2]) < 0 ? -1.0 : 1.0;
-    lattice.rotation = glm::dmat3(x, y, side * glm::cross(x, y));
+    lattice.voxel_size = shape.size;
+    lattice.rotation = shape.rotation;
     return lattice;
   }
 
