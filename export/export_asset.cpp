@@ -36,9 +36,9 @@ class Exporter {
     std::vector<std::unique_ptr<LevelFile>> files;
     for (const LevelEntry* entry : entries) {
       FARFIELD_TRY_LET(auto file, open(*entry));
-      note_other_part(*entry);
       files.push_back(std::move(file));
     }
+    note_other_parts(entries);
     FARFIELD_TRY(is_volume_ ? write_volumes(entries, files) : write_surface(*entries.front(), files.front()->view()));
     return std::move(report_);
   }
@@ -95,12 +95,15 @@ class Exporter {
     return entries;
   }
 
-  void note_other_part(const LevelEntry& entry) {
-    if (is_volume_ && entry.triangles > 0)
-      note(entry, fmt::format("its surface, {} triangles, is not in a .vdb; .ply, .obj and .glb have it", entry.triangles));
-    if (!is_volume_ && entry.voxels > 0)
-      note(entry, fmt::format("its volume, {} voxels, is not in a {}; a .vdb has it", entry.voxels,
-                              target_.extension().string()));
+  /// What the format has no room for.
+  void note_other_parts(const std::vector<const LevelEntry*>& entries) {
+    std::vector<uint32_t> levels;
+    for (const LevelEntry* entry : entries)
+      if ((is_volume_ ? entry->triangles : entry->voxels) > 0) levels.push_back(entry->level);
+    if (levels.empty()) return;
+    report_.notes.push_back(fmt::format("level{} {}: {}", levels.size() == 1 ? "" : "s", list_of(levels),
+                                        is_volume_ ? "surfaces are left out; .ply, .obj and .glb have them"
+                                                   : "volumes are left out; a .vdb has them"));
   }
   void note(const LevelEntry& entry, const std::string& text) {
     report_.notes.push_back(fmt::format("level {}: {}", entry.level, text));

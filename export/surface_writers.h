@@ -31,6 +31,9 @@ Result<WrittenSurface> write_glb(const std::filesystem::path& path, const LevelO
 inline constexpr const char* kNormalsInRoughness =
     "how normals spread within faces is only in roughness; a .ply has it as it is";
 
+/// "level_3_17": the material of a group of faces.
+std::string group_name(const LevelOfAsset& from, size_t group);
+
 std::filesystem::path mtl_of(const std::filesystem::path& obj);
 
 }  // namespace farfield

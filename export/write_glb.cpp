@@ -88,8 +88,9 @@ Vertices make_vertices(const LevelView& level, const std::vector<FaceLook>& look
 
 Json to_json(const vec3& v) { return {v.x, v.y, v.z}; }
 
-Json material_json(const FaceLook& look) {
-  Json material = {{"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", look.roughness}}},
+Json material_json(const std::string& name, const FaceLook& look) {
+  Json material = {{"name", name},
+                   {"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", look.roughness}}},
                    {"doubleSided", true}};
   if (look.opacity < 1) material["alphaMode"] = "BLEND";
   Json extensions = Json::object();
@@ -117,7 +118,8 @@ class GlbFile {
   GlbFile(const LevelOfAsset& from, const Vertices& vertices, const MaterialGroups& groups) {
     add_head(from);
     add_primitives(vertices, groups);
-    for (const FaceLook& look : groups.looks) json_["materials"].push_back(material_json(look));
+    for (size_t g = 0; g < groups.looks.size(); ++g)
+      json_["materials"].push_back(material_json(group_name(from, g), groups.looks[g]));
     name_extensions();
     json_["accessors"] = accessors_;
     json_["bufferViews"] = views_;

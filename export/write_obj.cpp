@@ -99,6 +99,10 @@ std::vector<std::string> notes_of(const LevelOfAsset& from, const MaterialGroups
 
 }  // namespace
 
+std::string group_name(const LevelOfAsset& from, size_t group) {
+  return fmt::format("level_{}_{}", from.entry.level, group);
+}
+
 std::filesystem::path mtl_of(const std::filesystem::path& obj) {
   std::filesystem::path mtl = obj;
   return mtl.replace_extension(".mtl");
@@ -108,18 +112,17 @@ Result<WrittenSurface> write_obj(const std::filesystem::path& path, const LevelO
   const LevelView& level = from.level;
   const std::vector<uvec3> corners = face_corners(level);
   const MaterialGroups groups = group_materials(face_looks(level, corners), {.by_transmission = false});
-  const auto name_of = [&](size_t group) { return fmt::format("level_{}_{}", level.header.level, group); };
   TextFile obj(path), mtl(mtl_of(path));
   const std::string head = fmt::format("# {}: level {} of {}, resolution {}\n", kExportGenerator, from.entry.level,
                                        on_one_line(from.manifest.source), from.entry.resolution);
   mtl.add("{}", head);
-  for (size_t g = 0; g < groups.looks.size(); ++g) add_material(name_of(g), groups.looks[g], mtl);
+  for (size_t g = 0; g < groups.looks.size(); ++g) add_material(group_name(from, g), groups.looks[g], mtl);
   obj.add("{}mtllib {}\n", head, mtl_of(path).filename().string());
   add_positions(from, obj);
   add_normals(from, obj);
   for (size_t g = 0; g < groups.looks.size(); ++g) {
     if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, "export: cancelled");
-    obj.add("usemtl {}\n", name_of(g));
+    obj.add("usemtl {}\n", group_name(from, g));
     for (uint32_t i = groups.begin[g]; i < groups.begin[g + 1]; ++i)
       add_face(level, groups.faces[i], corners[groups.faces[i]], obj);
   }

@@ -16,7 +16,8 @@ VoxelShape voxel_shape(const std::array<dvec3, 3>& edges) {
     if (!std::isfinite(lengths[a]) || !(lengths[a] > 0)) out.is_singular = true;
   }
   if (out.is_singular) return out;
-  out.size = std::cbrt(lengths[0] * lengths[1] * lengths[2]);
+  const bool is_exact = lengths[0] == lengths[1] && lengths[0] == lengths[2];  // cbrt(0.125) is a little less than 0.5
+  out.size = is_exact ? lengths[0] : std::cbrt(lengths[0] * lengths[1] * lengths[2]);
   for (size_t a = 0; a < 3; ++a) {
     const size_t b = (a + 1) % 3;
     const bool is_edge_of_cube = std::abs(lengths[a] - out.size) <= kTolerance * out.size;
