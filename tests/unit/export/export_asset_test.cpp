@@ -141,9 +141,9 @@ TEST_F(ExportAsset, DamagedLevelsAreErrorsAndWriteNothing) {
     report ? ++written : ++refused;
     if (!is_sealed && bytes != original) {
       EXPECT_FALSE(report) << round;
-      if (!report) {
-        EXPECT_EQ(report.error().code, ErrorCode::BadFile) << report.error().message;
-      }
+      // Unsupported: the format's version was hit.
+      const ErrorCode code = report ? ErrorCode::BadFile : report.error().code;
+      EXPECT_TRUE(code == ErrorCode::BadFile || code == ErrorCode::Unsupported) << round;
     }
     EXPECT_EQ(fs::exists(target), report.has_value()) << round;
     fs::remove(target);
