@@ -100,6 +100,7 @@ openvdb::GridBase::Ptr make_grid(const VolumeGrid& given) {
   if (given.kind == VolumeGrid::Kind::Density) grid->setGridClass(openvdb::GRID_FOG_VOLUME);
   if (given.kind == VolumeGrid::Kind::Vector) grid->setVectorType(openvdb::VEC_INVARIANT);
   add_metadata(*grid, given.metadata);
+  grid->addStatsMetadata();  // bounds, for who reads the header alone
   return grid;
 }
 

@@ -162,6 +162,7 @@ TEST_F(ExportVolume, SeveralLevelsAreGridsAsOpenVdbNamesThem) {
     EXPECT_EQ(density.metadata.at("farfield_version").find("farfield "), 0u);
     EXPECT_EQ(density.metadata.at("units"), "1 / length unit of the source");
     EXPECT_EQ(density.metadata.at("farfield_medium"), "fog");
+    EXPECT_TRUE(density.metadata.contains("file_bbox_max"));
     // A voxel of level k is 2^k wide; voxel (0, 0, 0) of each level starts in the same corner.
     const glm::dmat4& m = density.index_to_source;
     EXPECT_NEAR(glm::length(dvec3(m[0])), entry.resolution, 1e-12);
