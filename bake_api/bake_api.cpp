@@ -6,6 +6,7 @@
 
 #include "bake/bake.h"
 #include "bake_api/gather_mesh.h"
+#include "bake_api/gather_volume.h"
 #include "bake_api/memory_guard.h"
 #include "bake_api/source_from_input.h"
 #include "base/bytes.h"
@@ -16,12 +17,30 @@
 namespace farfield {
 namespace {
 
+Downsampling downsampling_of(BakeDownsampling method) {
+  switch (method) {
+    case BakeDownsampling::Linear:
+      return Downsampling::Linear;
+    case BakeDownsampling::Transp:
+      return Downsampling::Transp;
+    case BakeDownsampling::Iso:
+      return Downsampling::Iso;
+    case BakeDownsampling::Aniso:
+      return Downsampling::Aniso;
+    case BakeDownsampling::Matched:
+      return Downsampling::Matched;
+  }
+  return Downsampling::Matched;
+}
+
 BakeOptions bake_options(const BakeSettings& settings, const MemoryGuard& guard) {
   BakeOptions options;
   options.finest_grid = settings.finest_grid;
   options.coarsest_grid = settings.coarsest_grid;
   options.rays_per_voxel = settings.rays_per_voxel;
   options.source_only = settings.source_only;
+  options.import.fog = fog_options(settings.fog);
+  options.downsampling = downsampling_of(settings.downsampling);
   options.job.cancel = guard.cancel();
   if (settings.progress) {
     // Voxels are counted by whichever thread did them.
@@ -84,6 +103,14 @@ Result<BakeSummary> bake_meshes(const BakeInput& input, const std::string& folde
     // What a function answers is not in the hash.
     options.even_if_up_to_date = has_material_function(input) && input.material_key.empty();
     return bake(std::move(asset), input.name, folder, options);
+  });
+}
+
+Result<BakeSummary> bake_volume(const BakeVolume& volume, const std::string& folder, const BakeSettings& settings) {
+  return run_limited(settings, [&](const BakeOptions& options) -> Result<BakeReport> {
+    options.job.report(0, "import");
+    FARFIELD_TRY_LET(SourceVolume source, gather_volume(volume, settings.fog, options.job.quiet()));
+    return bake(std::move(source), volume.name, folder, options);
   });
 }
 

@@ -11,7 +11,6 @@
 
 #include "base/file_io.h"
 #include "base/hash.h"
-#include "base/module_loader.h"
 #include "import/volume_module.h"
 
 namespace farfield {
@@ -21,14 +20,15 @@ namespace fs = std::filesystem;
 
 constexpr std::array<char, 8> kVdbMagic = {' ', 'B', 'D', 'V', 0, 0, 0, 0};
 
-Result<const VolumeModule*> volume_module() {
-  static const Result<const void*> entry = [] {
-    constexpr ModuleName kName{"farfield_volumes.so", kVolumeModuleEntry, "volumes cannot be read"};
-    return load_module(kName, module_folders());
-  }();
-  if (!entry) return tl::unexpected(entry.error());
-  return static_cast<const VolumeModule*>(*entry);
+Result<void> check_exists(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status)) return make_error(ErrorCode::NotFound, fmt::format("{}: no such file", path.string()));
+  if (fs::is_regular_file(status)) return {};
+  return make_error(ErrorCode::Io, fmt::format("{}: is not a regular file", path.string()));
 }
+
+}  // namespace
 
 Result<void> check_options(const FogOptions& options) {
   const auto invalid = [](const std::string& what) { return make_error(ErrorCode::InvalidArgument, what); };
@@ -42,16 +42,6 @@ Result<void> check_options(const FogOptions& options) {
     return invalid(fmt::format("--albedo must be from 0 to 1, not {},{},{}", albedo.x, albedo.y, albedo.z));
   return {};
 }
-
-Result<void> check_exists(const fs::path& path) {
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (!fs::exists(status)) return make_error(ErrorCode::NotFound, fmt::format("{}: no such file", path.string()));
-  if (fs::is_regular_file(status)) return {};
-  return make_error(ErrorCode::Io, fmt::format("{}: is not a regular file", path.string()));
-}
-
-}  // namespace
 
 std::string canonical_text(const FogOptions& options) {
   std::string text;

@@ -2,9 +2,9 @@
 // Reading OpenVDB files (.vdb): the density of a fog volume, with albedos if there are any.
 //
 // Grids: density is "density", or the only float grid that is a fog volume, or what the options name; float, half and
-// double. Albedos are a vec3 grid "albedo" or "Cd" on the same lattice. Emission (temperature, heat, flame, fire) is
-// not modelled: as a density it is refused, beside one it is ignored and said to be. What else is there is ignored, and
-// said to be, too.
+// double. Albedos are a vec3 grid "albedo" or "Cd" (of "X_level_2": "albedo_level_2") on its lattice. Emission (flame)
+// is not modelled: as a density it is refused, beside one it is ignored and said to be. What else is there is ignored,
+// and said to be, too.
 //
 // OpenVDB's voxel (i, j, k) is a sample whose *centre* is where its transform puts (i, j, k): half a voxel is
 // subtracted once, here.
@@ -36,6 +36,9 @@ Result<VolumeExtent> read_volume_extent(const std::filesystem::path& path, const
 /// larger extent than a level can hold); InvalidArgument (options); Cancelled.
 Result<SourceVolume> read_volume(const std::filesystem::path& path, const FogOptions& options = {},
                                  const Job& job = {});
+
+/// Errors: InvalidArgument, naming the option as the command calls it.
+Result<void> check_options(const FogOptions& options);
 
 /// The source_hash that read_volume() would give. Errors: those of reading the file.
 Result<uint64_t> hash_volume(const std::filesystem::path& path, const FogOptions& options);

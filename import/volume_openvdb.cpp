@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The module farfield_volumes: OpenVDB files [Museth 2013]. Nothing of OpenVDB leaves this file; what it throws ends
-// here as an Error.
+// The module farfield_volumes, and what reads OpenVDB files [Museth 2013]. Nothing of OpenVDB leaves this file; what it
+// throws ends here as an Error.
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
@@ -15,6 +15,8 @@
 
 #include "farfield/export.h"
 #include "import/volume_module.h"
+#include "import/volume_write_openvdb.h"
+#include "import/voxel_shape.h"
 
 namespace farfield {
 namespace {
@@ -22,7 +24,6 @@ namespace {
 using openvdb::Coord;
 using openvdb::CoordBBox;
 
-constexpr double kCubeTolerance = 1e-4;  ///< of a voxel's edges' lengths, and of the cosines between them
 constexpr double kSmallNegative = 1e-3;  ///< of the largest density: what filters leave behind, not an error
 constexpr uint64_t kMostTableBricks = uint64_t{1} << 26;  ///< the table of a level takes 4 bytes for each
 constexpr uint64_t kMostVoxels = 0xfffffff0ull;           ///< of a level: payload indices have 32 bits
@@ -34,6 +35,15 @@ std::string coordinate_text(const Coord& c) { return fmt::format("({}, {}, {})",
 bool is_emission(std::string name) {
   for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return std::ranges::find(kEmissionNames, name) != kEmissionNames.end();
+}
+
+/// "_level_3" of "density_level_3", a grid of several levels as OpenVDB's tools and ours name them; else nothing.
+std::string level_suffix(const std::string& name) {
+  constexpr std::string_view kMark = "_level_";
+  const size_t at = name.rfind(kMark);
+  const bool has_number = at != std::string::npos && at + kMark.size() < name.size() &&
+                          name.find_first_not_of("0123456789", at + kMark.size()) == std::string::npos;
+  return has_number ? name.substr(at) : "";
 }
 
 bool is_scalar(const openvdb::GridBase& grid) { return grid.valueType() == "float" || grid.valueType() == "double"; }
@@ -189,31 +199,20 @@ class VdbReader {
     }
     Lattice lattice{affine->getMat4()};
     std::array<dvec3, 3> edges;
-    std::array<double, 3> lengths;
     for (int axis = 0; axis < 3; ++axis) {  // rows: OpenVDB's vectors stand on the left
       const auto& m = lattice.index_to_source;
-      const auto a = static_cast<size_t>(axis);
-      edges[a] = {m(axis, 0), m(axis, 1), m(axis, 2)};
-      lengths[a] = glm::length(edges[a]);
-      if (!std::isfinite(lengths[a]) || !(lengths[a] > 0))
-        return error(ErrorCode::BadFile, "the transform of the grid \"{}\" is singular or not finite", grid.getName());
+      edges[static_cast<size_t>(axis)] = {m(axis, 0), m(axis, 1), m(axis, 2)};
     }
-    const double size = std::cbrt(lengths[0] * lengths[1] * lengths[2]);
-    for (size_t a = 0; a < 3; ++a) {
-      const size_t b = (a + 1) % 3;
-      const bool is_edge_of_cube = std::abs(lengths[a] - size) <= kCubeTolerance * size;
-      const bool is_upright = std::abs(glm::dot(edges[a], edges[b])) <= kCubeTolerance * lengths[a] * lengths[b];
-      if (is_edge_of_cube && is_upright) continue;
+    const VoxelShape shape = voxel_shape(edges);
+    if (shape.is_singular)
+      return error(ErrorCode::BadFile, "the transform of the grid \"{}\" is singular or not finite", grid.getName());
+    if (!shape.is_cube()) {
       return error(ErrorCode::Unsupported,
-                   "voxels of the grid \"{}\" are {} x {} x {}{}: only cubes are read; resample it to uniform voxels",
-                   grid.getName(), lengths[0], lengths[1], lengths[2], is_upright ? "" : ", sheared");
+                   "voxels of the grid \"{}\" are {}: only cubes are read; resample it to uniform voxels",
+                   grid.getName(), shape.other_shape);
     }
-    lattice.voxel_size = size;
-    // Exactly upright, and exactly the identity for a grid that is not turned.
-    const dvec3 x = edges[0] / lengths[0];
-    const dvec3 y = glm::normalize(edges[1] - glm::dot(edges[1], x) * x);
-    const double side = glm::dot(glm::cross(x, y), edges[2]) < 0 ? -1.0 : 1.0;
-    lattice.rotation = glm::dmat3(x, y, side * glm::cross(x, y));
+    lattice.voxel_size = shape.size;
+    lattice.rotation = shape.rotation;
     return lattice;
   }
 
@@ -407,10 +406,11 @@ class VdbReader {
       volume_.albedo = *options_.albedo;
       return {};
     }
+    const std::string suffix = level_suffix(density.getName());
     openvdb::GridBase::Ptr header;
     for (const char* name : kAlbedoNames)
       for (const auto& grid : contents_.grids)
-        if (!header && grid->getName() == name && grid->valueType() == "vec3s") header = grid;
+        if (!header && grid->getName() == name + suffix && grid->valueType() == "vec3s") header = grid;
     if (!header) {
       volume_.albedo = vec3(kDefaultAlbedo);
       warn("it says no albedo: {} is taken, --albedo says another", kDefaultAlbedo);
@@ -530,5 +530,6 @@ Result<SourceVolume> read(const std::string& path, const FogOptions& options, co
 }  // namespace
 }  // namespace farfield
 
-extern "C" FARFIELD_API const farfield::VolumeModule farfield_volume_module_1;
-const farfield::VolumeModule farfield_volume_module_1 = {farfield::read_extent, farfield::read};
+extern "C" FARFIELD_API const farfield::VolumeModule farfield_volume_module_2;
+const farfield::VolumeModule farfield_volume_module_2 = {farfield::read_extent, farfield::read,
+                                                         farfield::write_openvdb};

@@ -3,23 +3,15 @@
 #include <fmt/format.h>
 #include <png.h>
 
-#include <algorithm>
-#include <cmath>
 #include <csetjmp>
 
+#include "base/srgb.h"
 #include "base/temporary_file.h"
 #include "path_tracer/image.h"
 
 namespace farfield {
 
 namespace {
-
-// [IEC 1999]
-uint8_t srgb_byte(float linear) {
-  const float x = linear > 0 ? std::min(linear, 1.0f) : 0.0f;  // NaN becomes 0
-  const float encoded = x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1.0f / 2.4f) - 0.055f;
-  return static_cast<uint8_t>(255.0f * encoded + 0.5f);
-}
 
 // libpng's own file writing ignores a full disk; the temporary file remembers it.
 void write_bytes(png_structp png, png_bytep data, size_t bytes) {

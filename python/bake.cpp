@@ -2,6 +2,11 @@
 // farfield/bake.h for Python. farfield/__init__.py has brought all arrays into one shape.
 #include "python/bake.h"
 
+#include <pybind11/stl.h>
+
+#include <array>
+#include <utility>
+
 #include "farfield/bake.h"
 #include "python/materials.h"
 
@@ -42,14 +47,40 @@ BakeMesh to_mesh(const py::dict& fields, KeptArrays& arrays) {
   return mesh;
 }
 
-/// (mesh, its transform as a 3 x 4 array).
-BakeInstance to_instance(const py::tuple& pair) {
-  BakeInstance instance;
-  instance.mesh = pair[0].cast<uint32_t>();
-  const auto matrix = pair[1].cast<Array<double>>();
+/// A 3 x 4 array.
+glm::dmat4x3 to_matrix(const py::handle& rows) {
+  const auto array = rows.cast<Array<double>>();
+  glm::dmat4x3 matrix;
   for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column) instance.to_asset[column][row] = matrix.at(row, column);
-  return instance;
+    for (int column = 0; column < 4; ++column) matrix[column][row] = array.at(row, column);
+  return matrix;
+}
+
+/// (mesh, its transform).
+BakeInstance to_instance(const py::tuple& pair) { return {pair[0].cast<uint32_t>(), to_matrix(pair[1])}; }
+
+BakeDownsampling to_downsampling(const std::string& name) {
+  constexpr std::pair<const char*, BakeDownsampling> kNames[] = {{"linear", BakeDownsampling::Linear},
+                                                                 {"transp", BakeDownsampling::Transp},
+                                                                 {"iso", BakeDownsampling::Iso},
+                                                                 {"aniso", BakeDownsampling::Aniso},
+                                                                 {"matched", BakeDownsampling::Matched}};
+  for (const auto& [known, method] : kNames)
+    if (name == known) return method;
+  throw py::value_error("downsampling is linear, transp, iso, aniso or matched, not " + name);
+}
+
+BakeFog to_fog(const py::dict& fields) {
+  BakeFog fog;
+  fog.density_grid = fields["density_grid"].cast<std::string>();
+  fog.density_scale = fields["density_scale"].cast<double>();
+  if (!fields["albedo"].is_none()) {
+    const auto albedo = fields["albedo"].cast<std::array<float, 3>>();
+    fog.albedo = glm::vec3(albedo[0], albedo[1], albedo[2]);
+  }
+  fog.anisotropy = fields["anisotropy"].cast<double>();
+  fog.level_set = fields["level_set"].cast<bool>();
+  return fog;
 }
 
 BakeSettings to_settings(const py::dict& fields, LongCall& call, bool has_progress) {
@@ -60,6 +91,8 @@ BakeSettings to_settings(const py::dict& fields, LongCall& call, bool has_progre
   settings.source_only = fields["source_only"].cast<bool>();
   settings.threads = fields["threads"].cast<int>();
   settings.memory_limit_bytes = fields["memory_limit_bytes"].cast<uint64_t>();
+  settings.fog = to_fog(fields);
+  settings.downsampling = to_downsampling(fields["downsampling"].cast<std::string>());
   settings.cancel = &call.cancel();
   if (has_progress) settings.progress = [&call](double done, const std::string& stage) { call.report(done, stage); };
   return settings;
@@ -103,6 +136,24 @@ py::dict bake_arrays(const std::string& folder, const std::string& name, const p
   return to_dict(call.run([&] { return bake_meshes(input, folder, limits); }));
 }
 
+/// density: (depth, height, width); albedo: None, or the same with three channels.
+py::dict bake_density(const std::string& folder, const std::string& name, const Array<float>& density,
+                      const py::object& albedo, const py::object& to_asset, const py::dict& settings,
+                      const py::object& progress) {
+  LongCall call(progress);
+  KeptArrays arrays;
+  BakeVolume volume;
+  volume.name = name;
+  volume.depth = static_cast<uint32_t>(density.shape(0));
+  volume.height = static_cast<uint32_t>(density.shape(1));
+  volume.width = static_cast<uint32_t>(density.shape(2));
+  volume.density = BakeRows<1>(density.data(), static_cast<size_t>(density.size()));
+  volume.albedo = to_rows<3, float>(albedo, arrays);
+  volume.to_asset = to_matrix(to_asset);
+  const BakeSettings limits = to_settings(settings, call, !progress.is_none());
+  return to_dict(call.run([&] { return bake_volume(volume, folder, limits); }));
+}
+
 py::dict bake_source_file(const std::string& source, const std::string& folder, int mesh, const py::dict& settings,
                           const py::object& progress) {
   LongCall call(progress);
@@ -114,6 +165,7 @@ py::dict bake_source_file(const std::string& source, const std::string& folder, 
 
 void define_bake(py::module_& module) {
   module.def("bake_meshes", &bake_arrays);
+  module.def("bake_volume", &bake_density);
   module.def("bake_file", &bake_source_file);
 }
 

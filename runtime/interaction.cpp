@@ -12,6 +12,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "cache/level_values.h"
 #include "runtime/close_up.h"
 #include "runtime/interaction_model.h"
 #include "scattering/albedo.h"
@@ -56,27 +57,6 @@ SymMat3 to_world(const SymMat3& s, const ScaledInverse& inverse) {
   const SymMat3 world = congruence(glm::transpose(inverse.matrix), s);
   const float trace = world.trace();
   return trace > 0.0f ? world * (1.0f / trace) : world;
-}
-
-vec3 color_at(ArrayView<PackedColor> colors, uint32_t i) {
-  return colors.empty() ? vec3(0.0f) : unpack_color(colors[i]);
-}
-
-float unorm_at(ArrayView<uint8_t> values, uint32_t i) { return values.empty() ? 1.0f : unpack_unorm8(values[i]); }
-
-/// Radiance at an element of a level.
-vec3 emission_at(ArrayView<PackedRadiance> radiances, uint32_t i) {
-  return radiances.empty() ? vec3(0.0f) : unpack_radiance(radiances[i]);
-}
-
-/// What is known of a face as a whole, but for its normals.
-SurfaceParams face_params(const LevelView& level, uint32_t face) {
-  SurfaceParams params;
-  params.diffuse = color_at(level.face_diffuse, face);
-  params.specular = color_at(level.face_specular, face);
-  params.transmission = color_at(level.face_transmission, face);
-  params.roughness2 = unorm_at(level.face_roughness2, face);
-  return params;
 }
 
 /// The normal around which a distribution lies, and how far it spreads: like the roughness2 of a GGX lobe
@@ -125,32 +105,17 @@ vec3 open_side_to_world(const vec3& open_side, const ScaledInverse& inverse) {
   return glm::length(open_side) * glm::normalize(glm::transpose(inverse.matrix) * open_side);
 }
 
-FlakeParams flake_params(const LevelView& level, const InstanceRecord& instance, uint32_t voxel) {
+FlakeParams world_flake_params(const LevelView& level, const InstanceRecord& instance, uint32_t voxel) {
   const ScaledInverse inverse(instance);
-  FlakeParams params;
-  params.sggx = to_world(level.voxel_sggx.empty() ? SymMat3::identity() : unpack(level.voxel_sggx[voxel]), inverse);
-  params.diffuse = color_at(level.voxel_diffuse, voxel);
-  params.specular = color_at(level.voxel_specular, voxel);
-  params.transmission = color_at(level.voxel_transmission, voxel);
-  params.roughness2 = unorm_at(level.voxel_roughness2, voxel);
-  params.self_shadowing = unorm_at(level.voxel_self_shadowing, voxel);
-  params.hot_spot = level.header.hot_spot;
-  params.highlight_lean = level.header.highlight_lean;
-  if (level.header.open_side != vec3(0.0f)) params.open_side = open_side_to_world(level.header.open_side, inverse);
+  FlakeParams params = flake_params(level, voxel);
+  params.sggx = to_world(params.sggx, inverse);
+  if (params.open_side != vec3(0.0f)) params.open_side = open_side_to_world(params.open_side, inverse);
   return params;
 }
 
-FogParams fog_params(const LevelView& level, const InstanceRecord& instance, uint32_t voxel) {
-  FogParams params;
-  params.albedo = level.voxel_albedo.empty() ? level.header.fog_albedo : unpack_albedo(level.voxel_albedo[voxel]);
-  params.self_shadowing = unorm_at(level.voxel_self_shadowing, voxel);
-  params.anisotropy = level.header.fog_anisotropy;
-  if (!level.voxel_anisotropy.empty()) {  // of all that the voxel scatters, so nothing is left to tell apart
-    params.anisotropy = unpack_anisotropy(level.voxel_anisotropy[voxel]);
-    params.albedo = cluster_albedo(params.albedo, std::exchange(params.self_shadowing, 1.0f));
-  }
-  params.has_shape = !level.voxel_sggx.empty();
-  if (params.has_shape) params.sggx = to_world(unpack(level.voxel_sggx[voxel]), ScaledInverse(instance));
+FogParams world_fog_params(const LevelView& level, const InstanceRecord& instance, uint32_t voxel) {
+  FogParams params = fog_params(level, voxel);
+  if (params.has_shape) params.sggx = to_world(params.sggx, ScaledInverse(instance));
   return params;
 }
 
@@ -282,7 +247,7 @@ Interaction make_interaction(const HitLevels& levels, const InstanceRecord& inst
 
   if (hit.is_volume && view.header.medium == Medium::Fog) {
     interaction.kind = Interaction::Kind::Volume;
-    const FogParams params = fog_params(view, instance, hit.element);
+    const FogParams params = world_fog_params(view, instance, hit.element);
     interaction.albedo = cluster_albedo(params.albedo, params.self_shadowing);
     interaction.reflectance.fog = params.albedo;
     interaction.reflectance.anisotropy = params.anisotropy;
@@ -292,7 +257,7 @@ Interaction make_interaction(const HitLevels& levels, const InstanceRecord& inst
   }
   if (hit.is_volume) {
     interaction.kind = Interaction::Kind::Volume;
-    const FlakeParams params = flake_params(view, instance, hit.element);
+    const FlakeParams params = world_flake_params(view, instance, hit.element);
     set_reflectance(interaction.reflectance, params);
     set_sggx(interaction.reflectance, params.sggx);
     interaction.reflectance.self_shadowing = params.self_shadowing;

@@ -12,6 +12,8 @@
 namespace farfield::tool {
 namespace {
 
+constexpr int kHighestLevel = 1000;
+
 /// All of `text` as a decimal number in [lowest, highest]: digits only.
 std::optional<int> read_number(std::string_view text, int lowest, int highest) {
   int value = 0;
@@ -99,13 +101,21 @@ tl::unexpected<Error> is_there_twice(std::string_view value) {
 }
 
 Result<LevelRange> parse_level_range(std::string_view text) {
-  constexpr int kHighest = 1000;
-  if (const auto level = read_number(text, 0, kHighest))
+  if (const auto level = read_number(text, 0, kHighestLevel))
     return LevelRange{static_cast<uint32_t>(*level), static_cast<uint32_t>(*level)};
-  const auto range = read_pair(text, '-', 0, kHighest);
+  const auto range = read_pair(text, '-', 0, kHighestLevel);
   if (!range || range->first > range->second)
     return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is not a range of levels such as 2-5", text));
   return LevelRange{static_cast<uint32_t>(range->first), static_cast<uint32_t>(range->second)};
+}
+
+Result<std::vector<uint32_t>> parse_levels(std::string_view text) {
+  if (text == "all") return std::vector<uint32_t>();
+  return parse_list<uint32_t>(text, [](std::string_view word) -> Result<uint32_t> {
+    if (const auto level = read_number(word, 0, kHighestLevel)) return static_cast<uint32_t>(*level);
+    return make_error(ErrorCode::InvalidArgument,
+                      fmt::format("\"{}\" is not a level's number; levels are a list such as 2,3, or all", word));
+  });
 }
 
 }  // namespace farfield::tool

@@ -67,4 +67,7 @@ struct LevelRange {
 /// Reads "2-5" or "3"; both in [0, 1000], first <= last. Errors: InvalidArgument.
 Result<LevelRange> parse_level_range(std::string_view text);
 
+/// Reads "3", "0,2,5" or "all", which is no list; each in [0, 1000], none twice. Errors: InvalidArgument.
+Result<std::vector<uint32_t>> parse_levels(std::string_view text);
+
 }  // namespace farfield::tool

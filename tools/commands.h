@@ -20,6 +20,7 @@ void add_bake_command(CLI::App& app, Action& action);
 void add_info_command(CLI::App& app, Action& action);
 void add_verify_command(CLI::App& app, Action& action);
 void add_evaluate_command(CLI::App& app, Action& action);
+void add_export_command(CLI::App& app, Action& action);
 void add_render_command(CLI::App& app, Action& action);
 void add_shot_command(CLI::App& app, Action& action);
 void add_trade_command(CLI::App& app, Action& action);

@@ -77,7 +77,7 @@ bool is_same_place(const fs::path& a, const fs::path& b) {
 
 Result<void> check_extension(const fs::path& path, Output output) {
   const char* expected = output == Output::Exr ? ".exr" : ".png";
-  if (output == Output::Text || path.extension() == expected) return {};
+  if (output == Output::Text || output == Output::File || path.extension() == expected) return {};
   return make_error(ErrorCode::InvalidArgument,
                     fmt::format("{}: the file that is written here must be named {}", path.string(), expected));
 }

@@ -24,8 +24,8 @@ std::string one_line(std::string_view text);
 /// Rows of equal length; the first is the head. Columns as wide as their widest cell, right-aligned, two blanks apart.
 std::string format_table(const std::vector<std::vector<std::string>>& rows);
 
-/// Text may also go to /dev/stdout or a pipe; pictures are files, named .exr or .png.
-enum class Output { Text, Exr, Png };
+/// Text may also go to /dev/stdout or a pipe; the rest are files, pictures named .exr or .png.
+enum class Output { Text, File, Exr, Png };
 
 /// Fails at once when `path` cannot become a file (its folder does not exist or may not be written, it is a folder, or
 /// its name is that of another kind), so that long jobs do not end that way; and when it would replace one of `inputs`

@@ -73,6 +73,7 @@ int run(int argc, char** argv) {
   tool::add_info_command(app, action);
   tool::add_verify_command(app, action);
   tool::add_evaluate_command(app, action);
+  tool::add_export_command(app, action);
   tool::add_render_command(app, action);
   tool::add_shot_command(app, action);
   tool::add_trade_command(app, action);

@@ -63,4 +63,23 @@ std::string scene_report_json(const std::vector<AssetReport>& assets) {
   return to_text({{"assets", json}});
 }
 
+std::string export_report_json(const std::string& asset, const std::string& target, const ExportReport& report) {
+  Json levels = Json::array();
+  for (const ExportedLevel& level : report.levels) {
+    Json json = {{"level", level.level}, {"resolution", level.resolution}};
+    if (level.grids.empty()) {
+      json["faces"] = level.faces;
+      json["vertices"] = level.vertices;
+      json["materials"] = level.materials;
+    } else {
+      json["voxels"] = level.voxels;
+      json["grids"] = level.grids;
+    }
+    levels.push_back(std::move(json));
+  }
+  Json files = Json::array();
+  for (const std::filesystem::path& file : files_of_export(target)) files.push_back(file.string());
+  return to_text({{"asset", asset}, {"files", files}, {"warnings", report.notes}, {"levels", levels}});
+}
+
 }  // namespace farfield::tool

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `farfield bake --report` writes.
+// What `farfield bake --report` and `farfield export --report` write.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bake/bake.h"
+#include "export/export_asset.h"
 
 namespace farfield::tool {
 
@@ -22,5 +23,8 @@ struct AssetReport {
 };
 /// The reports of a scene's assets: {"assets": [...]}, each as bake_report_json() has it and with what it took.
 std::string scene_report_json(const std::vector<AssetReport>& assets);
+
+/// What was exported of an asset, and where to.
+std::string export_report_json(const std::string& asset, const std::string& target, const ExportReport& report);
 
 }  // namespace farfield::tool

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The bake as a call: meshes in the host's memory become a folder of levels, which Runtime::open_asset() opens.
+// The bake as a call: meshes or fog in the host's memory become a folder of levels, which Runtime::open_asset() opens.
 //
 //   farfield::BakeMesh mesh;
 //   mesh.points = points;    // std::vector<glm::vec3>, or a pointer with a count and a stride
@@ -17,6 +17,7 @@
 #include <cstring>
 #include <functional>
 #include <glm/glm.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -158,11 +159,36 @@ struct BakeInput {
   std::string material_key;
 };
 
+/// Fog in the host's memory: a box of voxels, cubes in the asset's space. It becomes an asset of its own.
+struct BakeVolume {
+  std::string name = "memory";  ///< what the asset says of its source
+  uint32_t width = 0, height = 0, depth = 0;
+  BakeRows<1> density;  ///< width * height * depth, x fastest, then y, then z: finite, >= 0; at least one above 0
+  BakeRows<3> albedo;   ///< the same of linear RGB in [0, 1], single scattering. None: BakeFog::albedo
+  /// Voxel (i, j, k) is where this puts the cube [i, i + 1] x [j, j + 1] x [k, k + 1]: any rotation, mirrored or not,
+  /// one size along all axes.
+  glm::dmat4x3 to_asset{1.0};
+};
+
+/// What a volume does not say itself.
+struct BakeFog {
+  std::string density_grid;         ///< of an OpenVDB file: the grid's name; empty: "density", or its only fog volume
+  double density_scale = 1;         ///< density 1 is this attenuation coefficient, in 1 / unit of the asset; > 0
+  std::optional<glm::vec3> albedo;  ///< single scattering, linear RGB in [0, 1]; none: the volume's own, or 0.99
+  double anisotropy = 0;            ///< mean cosine of scattering, -0.98 to 0.98 (Henyey-Greenstein)
+  bool level_set = false;           ///< of an OpenVDB file: take a level set for the fog inside it; else it is refused
+};
+
+/// How levels of a volume are made (docs/decisions/0026).
+enum class BakeDownsampling : uint8_t { Linear, Transp, Iso, Aniso, Matched };
+
 struct BakeSettings {
-  uint32_t finest_grid = 512;       ///< voxels along the longest side of level 1: a power of two, up to 4096
-  uint32_t coarsest_grid = 8;       ///< the same of the last level, the root; <= finest_grid
-  uint32_t rays_per_voxel = 200;    ///< that measure each voxel's occlusion, >= 1
-  bool source_only = false;         ///< level 0 only: the source, ready to render
+  uint32_t finest_grid = 512;     ///< voxels along the longest side of level 1: a power of two, up to 4096
+  uint32_t coarsest_grid = 8;     ///< the same of the last level, the root; <= finest_grid
+  uint32_t rays_per_voxel = 200;  ///< that measure each voxel's occlusion, >= 1
+  bool source_only = false;       ///< level 0 only: the source, ready to render
+  BakeFog fog;                    ///< of volumes alone; their grids are their own: finest_grid is not looked at
+  BakeDownsampling downsampling = BakeDownsampling::Matched;
   int threads = 0;                  ///< 0: as many as the machine has
   uint64_t memory_limit_bytes = 0;  ///< what the process may grow by meanwhile, as `ps` shows it; 0: no limit
   /// How far the bake is, in [0, 1], and what it does. Called now and then, from any thread, one call at a time. Must
@@ -197,9 +223,14 @@ struct BakeSummary {
 FARFIELD_API Result<BakeSummary> bake_meshes(const BakeInput& input, const std::string& folder,
                                              const BakeSettings& settings = {});
 
-/// The same for a file: OBJ with MTL, PLY, glTF or glb, gzipped or not; or an OpenVDB volume (.vdb), whose grids are
-/// its own and whose densities are taken as they are, in 1 / scene unit. mesh: of glTF this one alone, in its own
-/// space; -1: all nodes of the scene. Errors: also those of reading it.
+/// The same for a volume. Its densities are copied, 2 KiB for each 8^3 voxels that hold any. Errors: those that are not
+/// of meshes and textures; InvalidArgument names the voxel.
+FARFIELD_API Result<BakeSummary> bake_volume(const BakeVolume& volume, const std::string& folder,
+                                             const BakeSettings& settings = {});
+
+/// The same for a file: OBJ with MTL, PLY, glTF or glb, gzipped or not; or an OpenVDB volume (.vdb), of which
+/// `settings.fog` says the rest. mesh: of glTF this one alone, in its own space; -1: all nodes of the scene. Errors:
+/// also those of reading it.
 FARFIELD_API Result<BakeSummary> bake_file(const std::string& source, const std::string& folder,
                                            const BakeSettings& settings = {}, int mesh = -1);
 

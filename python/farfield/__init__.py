@@ -27,7 +27,7 @@ from ._arrays import MaterialQueries
 from ._errors import Error
 from ._farfield import MaterialQuery
 
-__all__ = ["Asset", "Error", "MaterialQueries", "MaterialQuery", "Mesh", "bake", "bake_file", "batched", "evaluate", "info",
+__all__ = ["Asset", "Error", "MaterialQueries", "MaterialQuery", "Mesh", "bake", "bake_file", "bake_volume", "batched", "evaluate", "info",
            "open", "read_scene", "render"]
 __version__: str = _farfield.version
 
@@ -130,7 +130,7 @@ def bake(
             arrays.append(mesh._arrays())
         except ValueError as unfit:
             raise ValueError(f"mesh {i}{f' ({mesh.name})' if mesh.name else ''}: {unfit}") from None
-    settings = _settings(finest_grid, coarsest_grid, rays_per_voxel, source_only, threads, memory_limit)
+    settings = _settings(coarsest_grid, source_only, threads, memory_limit, finest_grid, rays_per_voxel)
     placed = _arrays.instances(instances, len(all_meshes))
     looks = _arrays.materials(materials)
     return _farfield.bake_meshes(os.fspath(out), name, arrays, placed, looks, material_key, settings, progress)
@@ -144,19 +144,69 @@ def bake_file(
     finest_grid: int = 512,
     coarsest_grid: int = 8,
     rays_per_voxel: int = 200,
+    density_grid: str = "",
+    density_scale: float = 1.0,
+    albedo: float | Sequence[float] | None = None,
+    anisotropy: float = 0.0,
+    level_set: bool = False,
+    downsampling: str = "matched",
     source_only: bool = False,
     threads: int = 0,
     memory_limit: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """bake() for a file: OBJ with MTL, PLY, glTF or glb, gzipped or not. mesh: of glTF this one alone, in its own space;
-    -1 is the whole scene."""
-    settings = _settings(finest_grid, coarsest_grid, rays_per_voxel, source_only, threads, memory_limit)
+    """bake() for a file: OBJ with MTL, PLY, glTF or glb, gzipped or not; or an OpenVDB volume (.vdb). mesh: of glTF this
+    one alone, in its own space; -1 is the whole scene. Of volumes alone: density_grid (without it "density", or the only
+    fog volume), level_set (take one for the fog inside it), and what bake_volume() has; their grids are their own."""
+    settings = _settings(coarsest_grid, source_only, threads, memory_limit, finest_grid, rays_per_voxel)
+    settings |= _fog(density_scale, albedo, anisotropy, downsampling, density_grid, level_set)
     return _farfield.bake_file(os.fspath(source), os.fspath(out), mesh, settings, progress)
 
 
+def bake_volume(
+    density: npt.ArrayLike,
+    out: Path,
+    *,
+    voxel_size: float = 1.0,
+    to_asset: npt.ArrayLike | None = None,
+    name: str = "memory",
+    coarsest_grid: int = 8,
+    density_scale: float = 1.0,
+    albedo: npt.ArrayLike | None = None,
+    anisotropy: float = 0.0,
+    downsampling: str = "matched",
+    source_only: bool = False,
+    threads: int = 0,
+    memory_limit: int = 0,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Bakes fog into the folder `out`, as bake() does meshes.
+
+    density: (depth, height, width), z, y, x: density[k, j, i] is that of the cube of voxel_size from voxel_size * (i, j,
+    k) on, which to_asset, a 4 x 4 or 3 x 4 matrix without shear or uneven scale, puts into the asset. density_scale: the
+    attenuation coefficient, in 1 / unit of the asset, where the density is 1. albedo of single scattering: a number, three
+    for linear RGB, or an array (depth, height, width, 3); without it 0.99. anisotropy: mean cosine of scattering, from
+    -0.98 to 0.98. downsampling: how levels are made, "linear", "transp", "iso", "aniso" or "matched".
+    """
+    values = np.ascontiguousarray(density, dtype=np.float32)
+    if values.ndim != 3:
+        raise ValueError(f"density: an array of shape (depth, height, width), not {values.shape}")
+    per_voxel = albedo is not None and np.ndim(albedo) == 4
+    albedos = None
+    if per_voxel:
+        albedos = np.ascontiguousarray(albedo, dtype=np.float32)
+        if albedos.shape != (*values.shape, 3):
+            raise ValueError(f"albedo: an array of shape {(*values.shape, 3)}, not {albedos.shape}")
+    place = _arrays.matrix(np.eye(4) if to_asset is None else to_asset, "to_asset")
+    place = place @ np.diag([voxel_size, voxel_size, voxel_size, 1.0])
+    settings = _settings(coarsest_grid, source_only, threads, memory_limit)
+    settings |= _fog(density_scale, None if per_voxel else albedo, anisotropy, downsampling)
+    return _farfield.bake_volume(os.fspath(out), name, values, albedos, place, settings, progress)
+
+
 def _settings(
-    finest_grid: int, coarsest_grid: int, rays_per_voxel: int, source_only: bool, threads: int, memory_limit: int
+    coarsest_grid: int, source_only: bool, threads: int, memory_limit: int, finest_grid: int = 512,
+    rays_per_voxel: int = 200
 ) -> dict[str, Any]:
     for name, value in (("finest_grid", finest_grid), ("coarsest_grid", coarsest_grid),
                         ("rays_per_voxel", rays_per_voxel), ("threads", threads), ("memory_limit", memory_limit)):
@@ -169,6 +219,26 @@ def _settings(
         "source_only": source_only,
         "threads": threads,
         "memory_limit_bytes": memory_limit,
+        **_fog(),
+    }
+
+
+def _fog(
+    density_scale: float = 1.0, albedo: Any = None, anisotropy: float = 0.0, downsampling: str = "matched",
+    density_grid: str = "", level_set: bool = False
+) -> dict[str, Any]:
+    if albedo is not None:
+        albedo = np.asarray(albedo, dtype=np.float64)
+        if albedo.shape not in ((), (3,)):
+            raise ValueError(f"albedo: a number or three, not of shape {albedo.shape}")
+        albedo = [float(value) for value in np.broadcast_to(albedo, 3)]
+    return {
+        "density_grid": density_grid,
+        "density_scale": density_scale,
+        "albedo": albedo,
+        "anisotropy": anisotropy,
+        "level_set": level_set,
+        "downsampling": downsampling,
     }
 
 

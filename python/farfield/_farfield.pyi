@@ -35,6 +35,15 @@ def bake_meshes(
     settings: dict[str, Any],
     progress: Callable[[float, str], Any] | None,
 ) -> dict[str, Any]: ...
+def bake_volume(
+    folder: str,
+    name: str,
+    density: npt.NDArray[np.float32],
+    albedo: npt.NDArray[np.float32] | None,
+    to_asset: npt.NDArray[np.float64],
+    settings: dict[str, Any],
+    progress: Callable[[float, str], Any] | None,
+) -> dict[str, Any]: ...
 def bake_file(
     source: str, folder: str, mesh: int, settings: dict[str, Any], progress: Callable[[float, str], Any] | None
 ) -> dict[str, Any]: ...

@@ -17,11 +17,12 @@ offers() {
 }
 
 offers "bake" ba
-offers "bake info verify evaluate render shot trade sky" ""
+offers "bake info verify evaluate export render shot trade sky" ""
 offers "--version" --ver
 offers "--budget" render --bud
 offers "--no-sky" render scene.glb -o out.exr --no
 offers "-o" bake -o
+offers "--level" export --le
 offers "" verify --bud
 offers "" bake oa # files are bash's own
 

@@ -80,7 +80,8 @@ void expect_quiet_success(const ProcessOutput& output) {
   EXPECT_EQ(output.err, "");
 }
 
-const std::vector<std::string> kCommands = {"bake", "info", "verify", "evaluate", "render", "shot", "trade", "sky"};
+const std::vector<std::string> kCommands = {"bake",   "info", "verify", "evaluate", "export",
+                                            "render", "shot", "trade",  "sky"};
 
 TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
   const std::vector<std::vector<std::string>> flags = {
@@ -89,6 +90,7 @@ TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
       {"--json", "--mesh", "--node"},
       {},
       {"--source", "--other-source", "--levels", "--views", "--spp", "--json", "--sheet", "--images"},
+      {"--level", "--output", "--report"},
       {"--frame", "--size", "--spp", "--budget", "--assets", "--blend", "--pixel-error", "--full-detail", "--output"},
       {"--frames", "--size", "--spp", "--budget", "--assets", "--blend", "--pixel-error", "--full-detail", "--output"},
       {"--frames", "--size", "--spp", "--budget", "--assets", "--pixel-error", "--rays-per-voxel", "--finest-grid",
@@ -154,6 +156,10 @@ TEST(Usage, NonsenseIsOneLineThatPointsToTheHelp) {
       {"shot", "a.glb", "-o", "b", "--frames", ""},
       {"shot", "a.glb", "-o", "b", "--frames", "0", "--pixel-error", "1,2"},
       {"shot", "a.glb", "-o", "b", "--frames", "0", "--turn-sun", "--environment", "c.exr"},
+      {"export", "a", "-o", "b.glb"},
+      {"export", "a", "--level", "2"},
+      {"export", "a", "--level", "2-3", "-o", "b.vdb"},
+      {"export", "a", "--level", "2,2", "-o", "b.vdb"},
       {"trade", "a.glb", "-o", "b"},
       {"trade", "a.glb", "--frames", "0-9"},
       {"trade", "a.glb", "-o", "b", "--frames", "9-1"},
@@ -205,6 +211,8 @@ TEST_F(BadInput, MissingFilesAreNamed) {
   expect_one_line_error(farfield({"info", path("no.farfield")}), path("no.farfield"));
   expect_one_line_error(farfield({"verify", path("no.farfield")}), path("no.farfield"));
   expect_one_line_error(farfield({"evaluate", path("no.farfield"), "--source", bush}), path("no.farfield"));
+  expect_one_line_error(farfield({"export", path("no.farfield"), "--level", "1", "-o", path("a.glb")}),
+                        path("no.farfield"));
   expect_one_line_error(farfield({"render", path("no.glb"), "-o", path("a.exr")}), path("no.glb"));
   expect_one_line_error(farfield({"shot", path("no.glb"), "--frames", "0-1", "-o", path("shot")}), path("no.glb"));
   expect_one_line_error(farfield({"trade", path("no.glb"), "--frames", "0-1", "-o", path("trade")}), path("no.glb"));
@@ -425,6 +433,64 @@ TEST_F(WholeRoad, EvaluateMeasuresWritesPicturesAndRecordsErrors) {
 
   const Json info = Json::parse(farfield({"info", asset, "--json"}).out);
   EXPECT_EQ(info["levels"][1]["color_error"], evaluation["levels"][0]["color_error"]);  // [0] is the source
+}
+
+/// What `farfield info` says of a surface as a whole.
+struct SurfaceFigures {
+  int64_t triangles = 0;
+  double area = 0, albedo = 0;
+
+  explicit SurfaceFigures(const Json& info) : triangles(info["triangles"]), area(info["area"]) {
+    double seen = 0;
+    for (const Json& m : info["materials"]) {
+      const double weight = m["area_share"].get<double>() * m["opacity"].get<double>();
+      for (const Json& channel : m["albedo"]) albedo += weight * channel.get<double>() / 3;
+      seen += weight;
+    }
+    albedo /= seen;
+  }
+};
+
+TEST_F(WholeRoad, ExportedSurfacesAreSourcesWithTheSameFacesAreaAndAlbedo) {
+  const Json levels = Json::parse(farfield({"info", asset, "--json"}).out)["levels"];
+  const auto level = std::ranges::find_if(levels, [](const Json& l) { return l["level"] > 0 && l["triangles"] > 0; });
+  ASSERT_NE(level, levels.end());
+  const std::string number = std::to_string((*level)["level"].get<int>());
+  std::vector<SurfaceFigures> figures;
+  for (const std::string ending : {"glb", "obj", "ply"}) {
+    const std::string file = path("level." + ending), again = path(ending + ".farfield");
+    const ProcessOutput exported =
+        farfield({"export", asset, "--level", number, "-o", file, "--report", path("r.json")});
+    EXPECT_EQ(exported.exit_code, 0) << exported.err;
+    EXPECT_EQ(without_warnings(exported.err), "");
+    const Json report = Json::parse(contents(path("r.json")));
+    EXPECT_EQ(report["files"][0], file);
+    EXPECT_EQ(report["levels"][0]["faces"], (*level)["triangles"]);
+    figures.emplace_back(Json::parse(farfield({"info", file, "--json"}).out));
+    EXPECT_EQ(figures.back().triangles, (*level)["triangles"]) << ending;
+    EXPECT_EQ(farfield({"bake", file, "-o", again, "--source-only"}).exit_code, 0);
+    EXPECT_EQ(Json::parse(farfield({"info", again, "--json"}).out)["levels"][0]["triangles"], (*level)["triangles"]);
+  }
+  for (const SurfaceFigures& other : figures) {
+    EXPECT_NEAR(other.area, figures[0].area, 1e-4 * figures[0].area);
+    EXPECT_NEAR(other.albedo, figures[0].albedo, 0.01 * figures[0].albedo);
+  }
+}
+
+TEST_F(WholeRoad, ExportRefusesWhatItCannotWrite) {
+  const auto fails = [&](std::vector<std::string> more, const std::string& words) {
+    more.insert(more.begin(), {"export", asset});
+    expect_one_line_error(farfield(more), words);
+  };
+  fails({"--level", "77", "-o", path("a.glb")}, "there is no level 77; it has 0, ");
+  fails({"--level", "0", "-o", path("a.stl")}, "must end in .vdb");
+  fails({"--level", "0", "-o", path("no/a.glb")}, "no/a.glb");
+  fails({"--level", "0", "-o", "/proc/a.obj"}, "/proc/a.obj");
+  fails({"--level", "0", "-o", asset + "/a.ply"}, "holds a baked asset");
+  fails({"--level", "0", "-o", path("a.ply"), "--report", path("no/r.json")}, "no/r.json");
+  fs::create_directories(path("folder.mtl"));
+  fails({"--level", "0", "-o", path("folder.obj")}, "folder.mtl");
+  for (const char* name : {"a.glb", "a.ply", "folder.obj"}) EXPECT_FALSE(fs::exists(path(name))) << name;
 }
 
 TEST_F(WholeRoad, EvaluateGivesTheSameFiguresForAnyNumberOfThreads) {

@@ -348,6 +348,73 @@ class Look(InAFolder):
                 call()
 
 
+class BakeVolume(InAFolder):
+    def setUp(self):
+        super().setUp()
+        z, y, x = np.mgrid[0:10, 0:12, 0:14]
+        self.density = np.where((x - 6) ** 2 + (y - 5) ** 2 + (z - 5) ** 2 < 17, 1.0, 0.0)
+        self.density[5, 5, 13] = 2  # a voxel far along x
+
+    def test_says_what_it_made(self):
+        report = farfield.bake_volume(self.density, self.out, voxel_size=0.5, albedo=0.9)
+        finest = report["levels"][0]
+        self.assertEqual(finest["voxels"], np.count_nonzero(self.density))
+        self.assertEqual(finest["resolution"], 0.5)
+        self.assertEqual(finest["grid"], 12)  # x from 2 to 13
+        self.assertEqual(report["warnings"], [])
+        self.assertTrue(farfield.bake_volume(self.density, self.out, voxel_size=0.5, albedo=0.9)["up_to_date"])
+        self.assertIn("no albedo", farfield.bake_volume(self.density, self.out)["warnings"][0])
+
+    def test_lies_where_it_is_put(self):
+        place = np.eye(4)
+        place[:3, 3] = (100, 200, 300)
+        farfield.bake_volume(self.density, self.out, voxel_size=0.5, to_asset=place, albedo=1)
+        origin = json.loads((self.out / "manifest.json").read_text())["origin"]
+        self.assertEqual(origin, [101, 200.5, 300.5])  # of the first voxel that has a density: (2, 1, 1)
+
+    def test_is_seen(self):
+        farfield.bake_volume(self.density, self.out, density_scale=100, albedo=(0.9, 0.1, 0.1))
+        picture = farfield.render(self.out, width=8, height=8, eye=(6.5, 5.5, 40), target=(6.5, 5.5, 5), fov_y=0.1,
+                                  level=0, light=(1, 1, 1), samples=16)
+        red, green, blue = picture[4, 4]
+        self.assertGreater(red, 3 * green)
+        self.assertAlmostEqual(float(green), float(blue), delta=0.1)
+
+    def test_albedos_may_vary(self):
+        albedo = np.full((*self.density.shape, 3), 0.5)
+        farfield.bake_volume(self.density, self.out, albedo=albedo)
+        farfield.bake_volume(self.density, self.folder / "same.farfield", albedo=(0.5, 0.5, 0.5))
+        self.assertEqual(farfield.info(self.out)["levels"][0]["voxels"],
+                         farfield.info(self.folder / "same.farfield")["levels"][0]["voxels"])
+
+    def test_methods_differ(self):
+        z, y, x = np.mgrid[0:32, 0:32, 0:32]
+        cloud = np.clip(1 + np.sin(0.9 * x + y) + np.sin(1.1 * y - z) + np.sin(0.8 * z + x), 0, None)
+        for method in ("linear", "matched"):
+            report = farfield.bake_volume(cloud, self.folder / method, albedo=0.9, downsampling=method)
+            self.assertGreater(len(report["levels"]), 1)
+        differ = self.level_bytes(self.folder / "linear") != self.level_bytes(self.folder / "matched")
+        self.assertTrue(differ)
+
+    def test_refuses_what_does_not_fit(self):
+        bake = farfield.bake_volume
+        for message, call in [
+            ("density: an array of shape", lambda: bake(self.density[0], self.out)),
+            ("albedo: an array of shape", lambda: bake(self.density, self.out, albedo=np.zeros((1, 2, 3, 3)))),
+            ("albedo: a number or three", lambda: bake(self.density, self.out, albedo=(0.1, 0.2))),
+            ("downsampling is", lambda: bake(self.density, self.out, downsampling="best")),
+        ]:
+            with self.subTest(message), self.assertRaisesRegex(ValueError, message):
+                call()
+        for message, call in [
+            ("voxel \\(13, 5, 5\\) is -2", lambda: bake(-self.density * (self.density > 1), self.out)),
+            ("must be cubes", lambda: bake(self.density, self.out, to_asset=np.diag([1, 2, 1, 1]))),
+            ("nothing to see", lambda: bake(np.zeros((2, 2, 2)), self.out)),
+        ]:
+            with self.subTest(message), self.assertRaisesRegex(farfield.Error, message):
+                call()
+
+
 class Package(unittest.TestCase):
     def test_stubs_say_what_there_is(self):
         folder = Path(farfield.__file__).parent

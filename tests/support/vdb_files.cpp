@@ -37,6 +37,16 @@ openvdb::GridBase::Ptr make_grid(const VdbGrid& given) {
   }
 }
 
+template <typename Grid, typename Put>
+void take_voxels(const openvdb::GridBase::Ptr& base, const Put& put, std::vector<VdbVoxel>& voxels) {
+  const auto grid = openvdb::gridPtrCast<Grid>(base);
+  if (!grid) return;
+  for (auto value = grid->cbeginValueOn(); value; ++value) {
+    const openvdb::Coord at = value.getCoord();
+    put(*value, voxels.emplace_back(VdbVoxel{{at.x(), at.y(), at.z()}, 0, vec3(0.0f)}));
+  }
+}
+
 }  // namespace
 
 std::vector<VdbVoxel> filled_cube(const ivec3& lower, int side, const std::function<double(const ivec3&)>& value) {
@@ -75,6 +85,35 @@ void write_frustum_vdb(const std::filesystem::path& path) {
   grid->setTransform(openvdb::math::Transform::createFrustumTransform(
       openvdb::BBoxd(openvdb::Vec3d(0.0), openvdb::Vec3d(10.0)), 0.5, 4.0));
   openvdb::io::File(path.string()).write({grid});
+}
+
+std::vector<VdbContent> read_vdb(const std::filesystem::path& path) {
+  openvdb::initialize();
+  openvdb::io::File file(path.string());
+  file.open(false);
+  std::vector<VdbContent> contents;
+  for (auto name = file.beginName(); name != file.endName(); ++name) {
+    const openvdb::GridBase::Ptr grid = file.readGrid(name.gridName());
+    VdbContent& content = contents.emplace_back();
+    content.name = grid->getName();
+    content.type = grid->valueType();
+    content.is_fog = grid->getGridClass() == openvdb::GRID_FOG_VOLUME;
+    const openvdb::math::Mat4d matrix = grid->transform().baseMap()->getAffineMap()->getMat4();
+    for (int column = 0; column < 4; ++column)
+      for (int row = 0; row < 4; ++row) content.index_to_source[column][row] = matrix(column, row);
+    const auto put_number = [](auto value, VdbVoxel& voxel) { voxel.value = static_cast<double>(value); };
+    take_voxels<openvdb::FloatGrid>(grid, put_number, content.voxels);
+    take_voxels<openvdb::Int32Grid>(grid, put_number, content.voxels);
+    take_voxels<openvdb::Vec3SGrid>(
+        grid,
+        [](const openvdb::Vec3s& v, VdbVoxel& voxel) {
+          voxel.color = {v.x(), v.y(), v.z()};
+        },
+        content.voxels);
+    for (auto item = grid->beginMeta(); item != grid->endMeta(); ++item)
+      content.metadata[item->first] = item->second->str();
+  }
+  return contents;
 }
 
 std::vector<double> march_vdb(const std::filesystem::path& path, std::span<const VdbRay> rays, double scale,

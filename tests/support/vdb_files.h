@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -40,6 +41,17 @@ std::vector<VdbVoxel> filled_cube(const ivec3& lower, int side, const std::funct
 void write_vdb(const std::filesystem::path& path, const std::vector<VdbGrid>& grids);
 /// One grid "density" in a frustum.
 void write_frustum_vdb(const std::filesystem::path& path);
+
+/// A grid as OpenVDB reads it.
+struct VdbContent {
+  std::string name, type;  ///< "float", "vec3s", "int32"
+  bool is_fog = false;
+  glm::dmat4 index_to_source{1.0};
+  std::vector<VdbVoxel> voxels;                 ///< that are active: value, of vectors color
+  std::map<std::string, std::string> metadata;  ///< as text
+};
+/// All grids of a file, in the file's order.
+std::vector<VdbContent> read_vdb(const std::filesystem::path& path);
 
 struct VdbRay {
   dvec3 origin{0.0}, direction{0.0, 0.0, 1.0};  ///< in the source's space; unit

@@ -92,5 +92,13 @@ TEST(ParseList, ReadsEachValueAndRefusesTheSameTwice) {
   EXPECT_NE(parse_list(std::string_view("1,2,1"), parse_pixel_error).error().message.find("twice"), std::string::npos);
 }
 
+TEST(ParseLevels, ReadsNumbersOrAll) {
+  EXPECT_EQ(parse_levels("3").value(), (std::vector<uint32_t>{3}));
+  EXPECT_EQ(parse_levels("5,0,2").value(), (std::vector<uint32_t>{5, 0, 2}));
+  EXPECT_TRUE(parse_levels("all").value().empty());
+  for (const char* text : {"", "all,1", "1,", "-1", "1001", "2-5", "two", "2,2"})
+    EXPECT_FALSE(parse_levels(text)) << text;
+}
+
 }  // namespace
 }  // namespace farfield::tool
