@@ -63,11 +63,12 @@ Result<void> check_options(const SubdivisionOptions& options) {
   if (options.scheme == SubdivisionScheme::None) return {};
   if (!(options.error > 0) || !std::isfinite(options.error)) {
     return make_error(ErrorCode::InvalidArgument,
-                      fmt::format("--subdivide-error must be above 0 and finite, not {}", options.error));
+                      fmt::format("the error of a subdivision must be above 0 and finite, not {}", options.error));
   }
   if (!(options.edge >= 0) || !std::isfinite(options.edge)) {
-    return make_error(ErrorCode::InvalidArgument,
-                      fmt::format("--subdivide-edge must be at least 0 and finite, not {}", options.edge));
+    return make_error(
+        ErrorCode::InvalidArgument,
+        fmt::format("the longest edge of a subdivision must be at least 0 and finite, not {}", options.edge));
   }
   return {};
 }

@@ -16,7 +16,7 @@ namespace farfield {
 /// faces. Without a scheme the mesh comes back as it is, with a warning if its tags go unheard. What is mended in a
 /// cage is a warning each. The same for any number of threads. `name` is for messages. Errors: InvalidArgument
 /// (options; Loop of other faces than triangles), BadFile, Unsupported (a cage of more than options.most_faces; those
-/// of make_cage), Cancelled; with the mesh's warnings. [Catmull and Clark 1978; Loop 1987]
+/// of make_cage), Cancelled; with the mesh's warnings. [Catmull and Clark 1978] [Loop 1987]
 Result<SourceMesh> subdivide(SourceMesh mesh, const SubdivisionOptions& options, const std::string& name,
                              const Job& job = {});
 

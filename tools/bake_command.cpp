@@ -126,9 +126,9 @@ std::vector<std::string> flags_without_use(const BakeArguments& arguments) {
     if (options.finest_grid == usual.finest_grid && options.rays_per_voxel == usual.rays_per_voxel &&
         options.import.subdivision.scheme == SubdivisionScheme::None)
       return {};
-    return {fmt::format(
-        "{}: --finest-grid, --rays-per-voxel and --subdivide are for models; a volume's grid is its own",
-        arguments.source)};
+    return {
+        fmt::format("{}: --finest-grid, --rays-per-voxel and --subdivide are for models; a volume's grid is its own",
+                    arguments.source)};
   }
   if (canonical_text(arguments.options.import.fog).empty()) return {};
   return {fmt::format("{}: is no volume; flags of volumes change nothing", arguments.source)};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Flags of commands that read meshes, which may be subdivision cages. Includes CLI11: only for the commands' .cpp files.
+// Flags of commands that read meshes, which may be subdivision cages. Includes CLI11: only for the commands' .cpp
+// files.
 #pragma once
 
 #include "import/subdivision_options.h"
@@ -10,8 +11,9 @@ namespace farfield::tool {
 /// What a mesh does not say itself.
 inline void add_subdivision_flags(CLI::App* command, SubdivisionOptions& options) {
   CLI::Option* scheme =
-      add_parsed_option(command, "--subdivide", options.scheme, parse_subdivision_scheme,
-                        "Meshes are cages of smooth surfaces: catmull-clark, or loop (triangles only); none: as they are")
+      add_parsed_option(
+          command, "--subdivide", options.scheme, parse_subdivision_scheme,
+          "Meshes are cages of smooth surfaces: catmull-clark, or loop (triangles only); none: as they are")
           ->default_str("none");
   command
       ->add_option("--subdivide-error", options.error,
