@@ -61,14 +61,16 @@ std::string text_without_grid(const SubdivisionOptions& options) {
 
 Result<void> check_options(const SubdivisionOptions& options) {
   if (options.scheme == SubdivisionScheme::None) return {};
-  if (!(options.error > 0) || !std::isfinite(options.error)) {
-    return make_error(ErrorCode::InvalidArgument,
-                      fmt::format("the error of a subdivision must be above 0 and finite, not {}", options.error));
+  constexpr double kLeast = 1e-4;  // of either: rounding is not far below, and nothing would see it
+  if (!(options.error >= kLeast) || !std::isfinite(options.error)) {
+    return make_error(ErrorCode::InvalidArgument, fmt::format("the error of a subdivision must be at least {} and "
+                                                              "finite, not {}",
+                                                              kLeast, options.error));
   }
-  if (!(options.edge >= 0) || !std::isfinite(options.edge)) {
-    return make_error(
-        ErrorCode::InvalidArgument,
-        fmt::format("the longest edge of a subdivision must be at least 0 and finite, not {}", options.edge));
+  if (!(options.edge == 0 || options.edge >= kLeast) || !std::isfinite(options.edge)) {
+    return make_error(ErrorCode::InvalidArgument, fmt::format("the longest edge of a subdivision must be 0 or at least "
+                                                              "{} and finite, not {}",
+                                                              kLeast, options.edge));
   }
   return {};
 }

@@ -55,7 +55,7 @@ struct SubdivisionOptions {
   double error = 0.125;  ///< how far faces may lie from the limit surface, > 0: a pixel, seen eight times nearer
   double edge = 0;       ///< the longest that the sides of faces may be (diagonals are longer); 0: what `error` gives
   uint32_t grid = 1024;  ///< set by the bake: twice its finest grid
-  uint64_t most_faces = 20'000'000;  ///< beyond it `error` and `edge` grow, with a warning
+  uint64_t most_faces = 10'000'000;  ///< beyond it `error` and `edge` grow, with a warning
 };
 
 /// Errors: InvalidArgument, by the name of the flag.

@@ -130,11 +130,15 @@ class Tessellator {
     pattern.GetCoords(&at[0].x);
     std::vector<bool> is_own(at.size(), true);
     const std::vector<uint32_t> vertex = vertices_of(face, pattern, is_own);
-    std::vector<vec3> normal(at.size());
+    std::vector<vec3> normal;
+    std::vector<vec2> uv;
+    std::vector<vec4> color;
     for (size_t i = 0; i < at.size(); ++i) {
       const LimitPoint point = limit.point(at[i]);
-      normal[i] = vec3(point.normal);
       if (is_own[i]) out_.positions[vertex[i]] = point.position;
+      normal.emplace_back(point.normal);
+      if (has_uv()) uv.emplace_back(limit.uv(at[i]));
+      if (has_color()) color.emplace_back(limit.color(at[i]));
     }
 
     std::vector<int> facets(4 * static_cast<size_t>(pattern.GetNumFacets()));
@@ -146,8 +150,8 @@ class Tessellator {
       const auto number = static_cast<size_t>(facets[i]);
       out_.corner_position[corner] = vertex[number];
       out_.corner_normal[corner] = normal[number];
-      if (has_uv()) out_.corner_uv[corner] = vec2(limit.uv(at[number]));
-      if (has_color()) out_.corner_color[corner] = vec4(limit.color(at[number]));
+      if (has_uv()) out_.corner_uv[corner] = uv[number];
+      if (has_color()) out_.corner_color[corner] = color[number];
       ++corner;
     }
   }
@@ -193,6 +197,13 @@ struct Plan {
   Layout layout;
 };
 
+/// About as many as there will be faces: enough to know of far too many before they are laid out.
+uint64_t cells_inside(const TessellationRates& rates) {
+  uint64_t count = 0;
+  for (const auto& [u, v] : rates.inside) count += static_cast<uint64_t>(u) * static_cast<uint64_t>(v);
+  return count;
+}
+
 /// Rates that keep within the limits or, where that would be too many faces, as near as may be: said once.
 Result<Plan> plan_faces(const LimitSurface& surface, TessellationLimits limits, const SubdivisionOptions& options,
                         const std::string& name, std::vector<std::string>& warnings, const Job& job) {
@@ -201,9 +212,13 @@ Result<Plan> plan_faces(const LimitSurface& surface, TessellationLimits limits, 
     Plan plan;
     plan.rates = find_rates(surface, limits, job);
     if (job.is_cancelled()) return cancelled();
-    plan.layout = lay_out(surface, plan.rates);
     const auto most = std::min<uint64_t>(options.most_faces, UINT32_MAX / 4);  // corners have 32-bit numbers
-    if (plan.layout.facet_count <= most) {
+    uint64_t count = cells_inside(plan.rates);
+    if (count <= most) {
+      plan.layout = lay_out(surface, plan.rates);
+      count = plan.layout.facet_count;
+    }
+    if (count <= most) {
       if (limits.error > asked) {
         warnings.push_back(fmt::format(
             "the cage's surface would take more than {} faces; they lie within {:.3g} voxels of it, not {:.3g}", most,
@@ -219,7 +234,7 @@ Result<Plan> plan_faces(const LimitSurface& surface, TessellationLimits limits, 
                                                             name, surface.cage().face_size.size(), most));
     }
     // Faces become fewer as the error grows, and with the square of edges.
-    const double growth = 1.1 * static_cast<double>(plan.layout.facet_count) / static_cast<double>(most);
+    const double growth = 1.1 * static_cast<double>(count) / static_cast<double>(most);
     limits.error *= growth;
     limits.edge *= std::sqrt(growth);
   }

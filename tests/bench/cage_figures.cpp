@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <ctime>
 #include <unordered_map>
@@ -19,9 +20,12 @@
 #include "base/hash.h"
 #include "import/read_source.h"
 #include "prefilter/subdivide.h"
+#include "tests/support/triangle_distance.h"
 
 namespace farfield {
 namespace {
+
+using test::distance_to_triangle;
 
 struct Tessellation {
   SourceMesh mesh;
@@ -31,20 +35,6 @@ struct Tessellation {
 struct Distance {
   double farthest = 0, rms = 0;
 };
-
-double distance_to_triangle(const dvec3& p, const dvec3& a, const dvec3& b, const dvec3& c) {
-  const dvec3 n = glm::cross(b - a, c - a);
-  const auto is_inside = [&](const dvec3& from, const dvec3& to) {
-    return glm::dot(glm::cross(to - from, p - from), n) >= 0;
-  };
-  if (is_inside(a, b) && is_inside(b, c) && is_inside(c, a)) return std::abs(glm::dot(p - a, n)) / glm::length(n);
-  const auto to_edge = [&](const dvec3& from, const dvec3& to) {
-    const dvec3 d = to - from;
-    const double t = std::clamp(glm::dot(p - from, d) / glm::dot(d, d), 0.0, 1.0);
-    return glm::length(p - from - t * d);
-  };
-  return std::min({to_edge(a, b), to_edge(b, c), to_edge(c, a)});
-}
 
 /// Triangles by the cells that they reach, `reach` around them included.
 class TriangleCells {
@@ -110,8 +100,8 @@ class Figures {
     const Distance distance = distance_of(by_error.mesh, error);
     print_row("by error", error, by_error, distance);
     // The largest faces of one size that are as near.
-    double small = 0.1, large = 256;
-    while (large / small > 1.05) {
+    double small = 1, large = 64;
+    while (large / small > 1.1) {
       const double middle = std::sqrt(small * large);
       (distance_of(cut(1e9, middle).mesh, error).farthest <= distance.farthest ? small : large) = middle;
     }
@@ -134,9 +124,9 @@ class Figures {
     return {std::move(*mesh), seconds};
   }
 
-  /// In voxels.
+  /// In voxels; what is farther than one and a half times the error is not told apart.
   Distance distance_of(const SourceMesh& mesh, double error) const {
-    const TriangleCells cells(mesh, 4 * error * voxel_);
+    const TriangleCells cells(mesh, 1.5 * error * voxel_);
     Distance distance;
     double sum = 0;
     for (const dvec3& p : limit_.positions) {
