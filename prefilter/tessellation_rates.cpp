@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A patch that is cut into nu * nv cells, each of two triangles, is off by no more than the sum of three parts: how far
 // its curves along u bend away from their chords, the same along v, and how far it is twisted within a cell. Each part
-// gets its share of the error that is allowed.
+// gets its share of the error that is allowed; a sixth is left for what is bent unevenly.
 #include "prefilter/tessellation_rates.h"
 
 #include <algorithm>
@@ -15,10 +15,10 @@ namespace {
 using glm::dvec2;
 using Parameterization = OpenSubdiv::Bfr::Parameterization;
 
-constexpr double kShareOfCurve = 0.4, kShareOfTwist = 0.2;
+constexpr double kShareOfCurve = 0.33, kShareOfTwist = 0.17;
 // Triangles bend along three directions that are not independent: in the middle of one the error is 4 / 9 of the sum
 // over its edges.
-constexpr double kShareOfTriangle = 0.7;
+constexpr double kShareOfTriangle = 0.6;
 
 double distance_to_segment(const dvec3& p, const dvec3& a, const dvec3& b) {
   const dvec3 ab = b - a;
