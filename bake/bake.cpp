@@ -54,7 +54,7 @@ Result<void> check_options(const BakeOptions& options) {
                                   kMaxGrid, finest, coarsest));
   }
   if (options.rays_per_voxel == 0) return make_error(ErrorCode::InvalidArgument, "bake: rays per voxel must be > 0");
-  return {};
+  return check_options(options.import.subdivision);
 }
 
 /// Equal text and source hash give equal bytes.
@@ -66,7 +66,8 @@ std::string canonical_options(const BakeOptions& options, bool is_volume) {
                        import);
   }
   const std::string node = options.import.node < 0 ? "" : fmt::format("node={} ", options.import.node);
-  const std::string import = fmt::format("mesh={} {}condition={}", options.import.mesh, node, kConditionVersion);
+  const std::string import = fmt::format("mesh={} {}{}condition={}", options.import.mesh, node,
+                                         canonical_text(import_options(options).subdivision), kConditionVersion);
   if (options.source_only) return "source_only=1 " + import;
   constexpr int kMorphVersion = 1;  // of what the manifest has of morphs
   return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} {} voxelize={} morph={}", options.finest_grid,
@@ -551,11 +552,17 @@ Result<BakeReport> import_and_bake(const fs::path& source, const fs::path& out, 
     FARFIELD_TRY_LET(auto volume, named_briefly(read_volume(source, options.import.fog, options.job.quiet())));
     return bake(std::move(volume), source.filename().string(), out, options);
   }
-  FARFIELD_TRY_LET(auto asset, named_briefly(import_asset(source, options.import, options.job.quiet())));
+  FARFIELD_TRY_LET(auto asset, named_briefly(import_asset(source, import_options(options), options.job.quiet())));
   return bake(std::move(asset), source.filename().string(), out, options);
 }
 
 }  // namespace
+
+ImportOptions import_options(const BakeOptions& options) {
+  ImportOptions import = options.import;
+  import.subdivision.grid = 2 * options.finest_grid;
+  return import;
+}
 
 std::optional<Manifest> find_up_to_date(const fs::path& source, const fs::path& out, const BakeOptions& options) {
   auto manifest = read_manifest(out);

@@ -34,6 +34,9 @@ struct BakeOptions {
   Job job;
 };
 
+/// What the import of a source is told: the bake's, with a cage's grid as fine as level 0.
+ImportOptions import_options(const BakeOptions& options);
+
 /// One level's part of the report.
 struct LevelReport {
   uint32_t level = 0;

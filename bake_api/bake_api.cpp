@@ -13,6 +13,7 @@
 #include "base/parallel.h"
 #include "base/result.h"
 #include "farfield/bake.h"
+#include "prefilter/subdivide.h"
 
 namespace farfield {
 namespace {
@@ -32,6 +33,26 @@ Downsampling downsampling_of(BakeDownsampling method) {
   }
   return Downsampling::Matched;
 }
+
+/// Schemes and rules have the same order there and here; a number that is none of them is refused.
+Result<SubdivisionOptions> subdivision_options(const BakeSubdivision& subdivision) {
+  if (subdivision.scheme > BakeSubdivision::Scheme::Loop ||
+      subdivision.boundary > BakeSubdivision::Boundary::EdgeOnly || subdivision.uv > BakeSubdivision::Uv::All) {
+    return make_error(ErrorCode::InvalidArgument, "bake: a subdivision with a scheme or rule that does not exist");
+  }
+  SubdivisionOptions options;
+  options.scheme = static_cast<SubdivisionScheme>(subdivision.scheme);
+  if (subdivision.boundary != BakeSubdivision::Boundary::EdgeAndCorner) {
+    options.boundary = static_cast<CageBoundary>(subdivision.boundary);
+  }
+  if (subdivision.uv != BakeSubdivision::Uv::CornersPlus1) options.uv = static_cast<CageUv>(subdivision.uv);
+  options.error = subdivision.error;
+  options.edge = subdivision.edge;
+  return options;
+}
+static_assert(static_cast<int>(BakeSubdivision::Scheme::Loop) == static_cast<int>(SubdivisionScheme::Loop));
+static_assert(static_cast<int>(BakeSubdivision::Boundary::EdgeOnly) == static_cast<int>(CageBoundary::EdgeOnly));
+static_assert(static_cast<int>(BakeSubdivision::Uv::All) == static_cast<int>(CageUv::All));
 
 BakeOptions bake_options(const BakeSettings& settings, const MemoryGuard& guard) {
   BakeOptions options;
@@ -77,10 +98,13 @@ Result<BakeSummary> run_limited(const BakeSettings& settings, const Run& run) {
   if (settings.threads < 0) {
     return make_error(ErrorCode::InvalidArgument, fmt::format("bake: {} threads", settings.threads));
   }
+  FARFIELD_TRY_LET(const auto subdivision, subdivision_options(settings.subdivision));
   const ThreadLimit threads(settings.threads);
   const MemoryGuard guard(settings.memory_limit_bytes, settings.cancel);
   try {
-    const Result<BakeReport> report = run(bake_options(settings, guard));
+    BakeOptions options = bake_options(settings, guard);
+    options.import.subdivision = subdivision;
+    const Result<BakeReport> report = run(std::move(options));
     if (report) return summary_of(*report);
     if (report.error().code == ErrorCode::Cancelled && guard.exceeded_bytes() > 0) {
       return out_of_memory(fmt::format("it took {} where {} are allowed", format_bytes(guard.exceeded_bytes()),
@@ -98,7 +122,9 @@ Result<BakeSummary> run_limited(const BakeSettings& settings, const Run& run) {
 Result<BakeSummary> bake_meshes(const BakeInput& input, const std::string& folder, const BakeSettings& settings) {
   return run_limited(settings, [&](BakeOptions options) -> Result<BakeReport> {
     options.job.report(0, "import");
-    FARFIELD_TRY_LET(SourceMesh mesh, source_from_input(input, options.job.quiet()));
+    FARFIELD_TRY_LET(SourceMesh cage, source_from_input(input, options.job.quiet()));
+    FARFIELD_TRY_LET(SourceMesh mesh,
+                     subdivide(std::move(cage), import_options(options).subdivision, input.name, options.job.quiet()));
     FARFIELD_TRY_LET(ImportedAsset asset, condition(std::move(mesh), input.name, options.job.quiet()));
     // What a function answers is not in the hash.
     options.even_if_up_to_date = has_material_function(input) && input.material_key.empty();

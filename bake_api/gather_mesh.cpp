@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <unordered_set>
 
 #include "base/index.h"
 #include "base/result.h"
@@ -111,6 +112,55 @@ Result<void> check_attribute(const BakeAttribute<N>& attribute, const BakeMesh& 
   return {};
 }
 
+/// Sharpness may be infinite.
+Result<void> check_sharpness(const BakeRows<1>& sharpness, size_t wanted, const MeshName& name, const char* what) {
+  if (sharpness.size() != wanted) {
+    return name.error("{} values of sharpness for {} {}; one for each", sharpness.size(), wanted, what);
+  }
+  for (size_t i = 0; i < wanted; ++i) {
+    if (!(sharpness.at(i) >= 0)) return name.error("sharpness {} of its {} is {}", i, what, sharpness.at(i));
+  }
+  return {};
+}
+
+uint64_t edge_key(uint32_t a, uint32_t b) { return uint64_t{std::min(a, b)} << 32 | std::max(a, b); }
+
+/// Corners and counts are checked already.
+std::unordered_set<uint64_t> edges_of(const BakeMesh& mesh, const Job& job) {
+  std::unordered_set<uint64_t> edges;
+  const auto point = [&](size_t corner) { return static_cast<uint32_t>(mesh.corners.at(corner)); };
+  size_t begin = 0;
+  for (size_t face = 0; face < face_count(mesh) && !job.is_cancelled(); ++face) {
+    const size_t count = mesh.counts.empty() ? 3 : static_cast<size_t>(mesh.counts.at(face));
+    for (size_t i = 0; i < count; ++i) edges.insert(edge_key(point(begin + i), point(begin + (i + 1) % count)));
+    begin += count;
+  }
+  return edges;
+}
+
+Result<void> check_creases(const BakeMesh& mesh, const MeshName& name, const Job& job) {
+  FARFIELD_TRY(check_sharpness(mesh.crease_sharpness, mesh.creases.size(), name, "creases"));
+  FARFIELD_TRY(check_sharpness(mesh.point_sharpness, mesh.sharp_points.size(), name, "sharp points"));
+  for (size_t i = 0; i < mesh.sharp_points.size() && !job.is_cancelled(); ++i) {
+    if (whole_number(mesh.sharp_points, i, mesh.points.size())) continue;
+    return name.error("sharp point {} is {}; there are points 0 to {}", i, mesh.sharp_points.at(i),
+                      static_cast<int64_t>(mesh.points.size()) - 1);
+  }
+  if (mesh.creases.empty()) return {};
+  const std::unordered_set<uint64_t> edges = edges_of(mesh, job);
+  for (size_t i = 0; i < mesh.creases.size() && !job.is_cancelled(); ++i) {
+    const double a = mesh.creases.at(i, 0), b = mesh.creases.at(i, 1);
+    const auto is_point = [](double p) {
+      return p >= 0 && p < static_cast<double>(kMostElements) && p == std::floor(p);
+    };
+    if (is_point(a) && is_point(b) && edges.contains(edge_key(static_cast<uint32_t>(a), static_cast<uint32_t>(b)))) {
+      continue;
+    }
+    return name.error("crease {} lies between points {} and {}, which no face joins by an edge", i, a, b);
+  }
+  return {};
+}
+
 Result<void> check_mesh(const BakeMesh& mesh, const MeshName& name, const BakeInput& input, const Job& job) {
   if (const auto point = find_not_finite<double>(mesh.points, job)) return name.error("point {} is not finite", *point);
   FARFIELD_TRY(check_counts(mesh, name, job));
@@ -118,7 +168,8 @@ Result<void> check_mesh(const BakeMesh& mesh, const MeshName& name, const BakeIn
   FARFIELD_TRY(check_materials(mesh, name, input, job));
   FARFIELD_TRY(check_attribute(mesh.uv, mesh, name, "uv coordinates", job));
   FARFIELD_TRY(check_attribute(mesh.normals, mesh, name, "normals", job));
-  return check_attribute(mesh.colors, mesh, name, "colors", job);
+  FARFIELD_TRY(check_attribute(mesh.colors, mesh, name, "colors", job));
+  return check_creases(mesh, name, job);
 }
 
 Result<void> check_instance(const BakeInstance& instance, size_t index, size_t mesh_count) {
@@ -167,6 +218,18 @@ glm::vec<N, float> value_at(const BakeAttribute<N>& attribute, size_t corner, si
   return row_of(attribute.values, attribute.per == BakePer::Point ? point : corner);
 }
 
+void append_creases(const BakeMesh& mesh, uint32_t first_position, CageTags& out) {
+  const auto point = [&](double number) { return first_position + static_cast<uint32_t>(number); };
+  for (size_t i = 0; i < mesh.creases.size(); ++i) {
+    out.crease_edges.emplace_back(point(mesh.creases.at(i, 0)), point(mesh.creases.at(i, 1)));
+    out.crease_sharpness.push_back(static_cast<float>(std::min(mesh.crease_sharpness.at(i), 1e30)));
+  }
+  for (size_t i = 0; i < mesh.sharp_points.size(); ++i) {
+    out.sharp_vertices.push_back(point(mesh.sharp_points.at(i)));
+    out.vertex_sharpness.push_back(static_cast<float>(std::min(mesh.point_sharpness.at(i), 1e30)));
+  }
+}
+
 /// Appends one instance of a checked mesh; a part of it after a cancel.
 void append(const BakeMesh& mesh, const glm::dmat4x3& to_asset, const Attributes& has, const Job& job,
             SourceMesh& out) {
@@ -174,6 +237,7 @@ void append(const BakeMesh& mesh, const glm::dmat4x3& to_asset, const Attributes
   for (size_t i = 0; i < mesh.points.size() && !job.is_cancelled(); ++i) {
     out.positions.push_back(to_asset * glm::dvec4(mesh.points.at(i, 0), mesh.points.at(i, 1), mesh.points.at(i, 2), 1));
   }
+  append_creases(mesh, first_position, out.cage);
   const glm::dmat3 linear(to_asset);
   const glm::dmat3 of_normals = glm::transpose(glm::inverse(linear));
   // A mirror image winds the other way; turned round, its faces agree with its normals again.

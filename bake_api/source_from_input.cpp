@@ -73,6 +73,13 @@ MaterialFunction one_by_one(const MaterialBatchFunction& batch) {
   };
 }
 
+void add_cage(const CageTags& cage, ContentHash& hash) {
+  hash.add(cage.crease_edges);
+  hash.add(cage.crease_sharpness);
+  hash.add(cage.sharp_vertices);
+  hash.add(cage.vertex_sharpness);
+}
+
 uint64_t hash_of(const SourceMesh& mesh, const std::string& material_key) {
   ContentHash hash;
   hash.add(mesh.positions);
@@ -86,6 +93,7 @@ uint64_t hash_of(const SourceMesh& mesh, const std::string& material_key) {
   for (const SourceMaterial& material : mesh.materials) add_material(material, textures, hash);
   hash.add(static_cast<bool>(mesh.material_function));
   hash.add(material_key);
+  if (!mesh.cage.empty()) add_cage(mesh.cage, hash);
   return hash.value();
 }
 

@@ -21,6 +21,9 @@ if(FARFIELD_BUILD_BAKE)
   # OpenVDB's own FindOpenVDB.cmake asks for Boost's and Blosc's development files, of which its headers need none here.
   find_path(OPENVDB_INCLUDE_DIR openvdb/openvdb.h REQUIRED)
   find_library(OPENVDB_LIBRARY openvdb REQUIRED)
+  # OpenSubdiv's own CMake config asks for its static libraries and for OpenGL's, which Debian's package does not bring.
+  find_path(OPENSUBDIV_INCLUDE_DIR opensubdiv/bfr/surface.h REQUIRED)
+  find_library(OPENSUBDIV_LIBRARY osdCPU REQUIRED)
 endif()
 if(FARFIELD_BUILD_TOOLS)
   find_package(OpenEXR 3.1 CONFIG REQUIRED)

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 
@@ -24,9 +25,12 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 /// Imports the source anew into an asset of level 0 only, which the path tracer then renders like any other.
-Result<Manifest> bake_source(const EvaluateOptions& options, const fs::path& folder) {
+Result<Manifest> bake_source(const EvaluateOptions& options, const Manifest& asset, const fs::path& folder) {
   BakeOptions bake_options;
   bake_options.source_only = true;
+  // A cage becomes just the faces of the asset's own level 0.
+  const uint32_t grid = asset.levels.front().grid / 2;
+  if (std::has_single_bit(grid) && grid >= bake_options.coarsest_grid) bake_options.finest_grid = grid;
   bake_options.import = options.import;
   bake_options.job = options.job.step("importing the source", 0.0, 0.0);
   FARFIELD_TRY_LET(auto report, bake(options.source, folder, bake_options));
@@ -37,9 +41,10 @@ Result<Manifest> bake_source(const EvaluateOptions& options, const fs::path& fol
 Error other_source_error(const EvaluateOptions& options) {
   return {
       ErrorCode::InvalidArgument,
-      fmt::format("{}: was not baked from {} as it is now (or from another --mesh of it); bake it again, or compare "
-                  "all the same with --other-source",
-                  options.asset.string(), options.source.string())};
+      fmt::format(
+          "{}: was not baked from {} as it is now (or with another --mesh or --subdivide); bake it again, or compare "
+          "all the same with --other-source",
+          options.asset.string(), options.source.string())};
 }
 
 std::vector<std::string> captions(const LevelEvaluation& level) {
@@ -250,7 +255,7 @@ Result<Evaluation> evaluate(const EvaluateOptions& options) {
   FARFIELD_TRY_LET(auto folder, TemporaryFolder::create());
   const bool has_source = !options.source.empty();
   const fs::path& source_folder = has_source ? folder.path() : options.asset;
-  FARFIELD_TRY_LET(const auto source_manifest, has_source ? bake_source(options, source_folder) : manifest);
+  FARFIELD_TRY_LET(const auto source_manifest, has_source ? bake_source(options, manifest, source_folder) : manifest);
 
   // What the import warned of is as true of the pictures.
   auto compared = compare(options, manifest, source_manifest, source_folder);

@@ -354,6 +354,7 @@ class GltfMeshReader {
     if (!mesh_.corner_color.empty()) mesh_.corner_color.resize(mesh_.corner_count(), vec4(1.0f));
     if (!mesh_.corner_normal.empty()) mesh_.corner_normal.resize(mesh_.corner_count(), vec3(0.0f));
     mesh_.source_files = document_.files_read();
+    mesh_.is_split = true;
     return std::move(mesh_);
   }
 

@@ -9,6 +9,7 @@
 
 #include "base/index.h"
 #include "base/result.h"
+#include "import/cage_tags.h"
 #include "import/corner_normals.h"
 #include "import/material_library.h"
 #include "import/read_formats.h"
@@ -37,6 +38,7 @@ class ObjReader {
       return make_error(ErrorCode::Unsupported, fmt::format("{}: more than 2^32 face corners", name_));
     }
     drop_faces_out_of_range();
+    drop_bad_tags();
     attach_uvs();
     attach_normals();
     attach_colors();
@@ -70,6 +72,8 @@ class ObjReader {
       material_ = materials_.find(text_.rest_of_line());
     else if (keyword == "mtllib")
       materials_.load(text_.rest_of_line());
+    else if (keyword == "t")
+      read_tag(keyword.data());
     else if (keyword == "#MRGB")
       read_polypaint();
     else if (keyword.starts_with('#'))
@@ -125,6 +129,15 @@ class ObjReader {
       const double value = v[count - 3 + c];
       colors_.back()[c] = std::isfinite(value) && value > 0 ? static_cast<float>(std::min(value, 1e30)) : 0.0f;
     }
+  }
+
+  /// Of a subdivision cage.
+  void read_tag(const char* at) {
+    const std::string_view line = text_.rest_of_line();
+    const std::string wrong = read_cage_tag(line, mesh_.cage);
+    if (wrong.empty()) return;
+    const std::string_view name = line.substr(0, line.find(' '));
+    note(ignored_[fmt::format("t {}, which {},", name, wrong)], at);
   }
 
   /// ZBrush paints vertices in comments: after each block of vertices their masks and colours, as MMRRGGBB.
@@ -215,6 +228,7 @@ class ObjReader {
       mesh_.face_material[face_count] = mesh_.face_material[face];
       face_group_[face_count] = face_group_[face];
       kept.face_begin.push_back(static_cast<uint32_t>(corner_count));
+      kept_faces_.push_back(static_cast<uint32_t>(face));
       ++face_count;
     }
     mesh_.corner_position.resize(corner_count);
@@ -223,6 +237,25 @@ class ObjReader {
     mesh_.face_begin = std::move(kept.face_begin);
     if (dropped > 0)
       mesh_.warnings.push_back(fmt::format("{} faces name vertices that do not exist; dropped", dropped));
+  }
+
+  /// Tags number faces as the file does; those that were dropped are numbers no more.
+  void drop_bad_tags() {
+    CageTags& tags = mesh_.cage;
+    size_t dropped = drop_tags_out_of_range(tags, mesh_.positions.size());
+    std::vector<uint32_t> holes;
+    for (const uint32_t face : tags.holes) {
+      const auto found = std::lower_bound(kept_faces_.begin(), kept_faces_.end(), face);
+      if (found != kept_faces_.end() && *found == face) {
+        holes.push_back(static_cast<uint32_t>(found - kept_faces_.begin()));
+      } else {
+        ++dropped;
+      }
+    }
+    tags.holes = std::move(holes);
+    if (dropped == 0) return;
+    mesh_.warnings.push_back(
+        fmt::format("{} tags of creases, corners or holes name what does not exist; ignored", dropped));
   }
 
   void attach_uvs() {
@@ -311,7 +344,8 @@ class ObjReader {
   std::vector<uint32_t> corner_uv_index_, corner_normal_index_;
   uint32_t smoothing_group_ = 0;
   std::vector<uint32_t> face_group_;
-  std::vector<vec3> painted_;  ///< by ZBrush
+  std::vector<uint32_t> kept_faces_;  ///< of the file's faces those whose vertices exist
+  std::vector<vec3> painted_;         ///< by ZBrush
   Ignored no_position_;
   std::map<std::string, Ignored> ignored_;  ///< by keyword
 };

@@ -131,6 +131,7 @@ class PlyReader {
     FARFIELD_TRY(attach_textures());
     attach_colors();
     say_what_was_ignored();
+    mesh_.is_split = true;  // a vertex has one normal and one uv
     return std::move(mesh_);
   }
 

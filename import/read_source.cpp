@@ -62,7 +62,9 @@ Result<SourceMesh> read_as_named(const Bytes& bytes, const fs::path& path, const
 
 uint64_t with_options(uint64_t hash, const ImportOptions& options) {
   hash = mix64(hash, static_cast<uint64_t>(options.mesh));
-  return options.node < 0 ? hash : mix64(hash, static_cast<uint64_t>(options.node));
+  if (options.node >= 0) hash = mix64(hash, static_cast<uint64_t>(options.node));
+  const uint64_t subdivision = hash_of(options.subdivision);
+  return subdivision == 0 ? hash : mix64(hash, subdivision);
 }
 
 /// Files that are not there do not count.

@@ -10,6 +10,7 @@
 
 #include "import/fog_options.h"
 #include "import/source_mesh.h"
+#include "import/subdivision_options.h"
 
 namespace farfield {
 
@@ -40,8 +41,9 @@ class FileHashes {
 struct ImportOptions {
   int mesh =
       -1;  ///< glTF only: import this mesh alone, in its own space; -1: all nodes of the default scene, flattened
-  int node = -1;     ///< glTF only: import all that this node of the file and those below show, in the node's own space
-  FogOptions fog{};  ///< OpenVDB files only: what read_volume() is given
+  int node = -1;  ///< glTF only: import all that this node of the file and those below show, in the node's own space
+  SubdivisionOptions subdivision{};    ///< of meshes; read_source() gives the cage, import_asset() what becomes of it
+  FogOptions fog{};                    ///< OpenVDB files only: what read_volume() is given
   FileHashes* known_hashes = nullptr;  ///< hashes are looked for there first; null: they read
 };
 

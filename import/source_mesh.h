@@ -13,6 +13,7 @@
 #include "base/surface_material.h"
 #include "base/vec.h"
 #include "farfield/material.h"
+#include "import/subdivision_options.h"
 #include "import/texture.h"
 
 namespace farfield {
@@ -37,7 +38,10 @@ struct SourceMesh {
   std::vector<vec4> corner_color;         ///< empty, or one per corner; linear RGBA
   std::vector<vec3> corner_normal;        ///< empty, or one per corner: shading normal, any length; 0: the face's own
   std::vector<uint32_t> face_material;    ///< index into materials
+  std::vector<uint32_t> face_number;      ///< empty, or of each face the number that the file's polygons give it
   std::vector<SourceMaterial> materials;
+  CageTags cage;                         ///< if the polygons are a subdivision cage: where it is sharp, and its rules
+  bool is_split = false;                 ///< vertices are doubled where uv or normals differ, as glTF has them
   MaterialFunction material_function;    ///< a host's own; if set, `materials` give names and modes only
   MaterialBatchFunction material_batch;  ///< answers as material_function, many places at once; may be empty
   std::vector<std::string> warnings;     ///< one line each

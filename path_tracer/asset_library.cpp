@@ -43,6 +43,7 @@ SceneBakeOptions scene_bake_options(const RenderOptions& options) {
   bake.source_only = options.full_detail;
   bake.read = {options.assemblies, options.fog};
   bake.downsampling = options.downsampling;
+  bake.subdivision = options.subdivision;
   return bake;
 }
 
@@ -56,6 +57,20 @@ void add_fog_flags(const FogOptions& fog, std::vector<std::string>& command) {
   if (fog.albedo) add("--albedo", fmt::format("{},{},{}", fog.albedo->x, fog.albedo->y, fog.albedo->z));
   if (fog.anisotropy != 0) add("--anisotropy", fmt::format("{}", fog.anisotropy));
   if (fog.level_set) command.push_back("--level-set");
+}
+
+// The same of a cage: the flags of tools/subdivision_flags.h.
+void add_subdivision_flags(const SubdivisionOptions& subdivision, std::vector<std::string>& command) {
+  if (subdivision.scheme == SubdivisionScheme::None) return;
+  const auto add = [&](const char* flag, const std::string& value) {
+    command.push_back(flag);
+    command.push_back(value);
+  };
+  add("--subdivide", name_of(subdivision.scheme));
+  add("--subdivide-error", fmt::format("{}", subdivision.error));
+  add("--subdivide-edge", fmt::format("{}", subdivision.edge));
+  if (subdivision.boundary) add("--subdivide-boundary", name_of(*subdivision.boundary));
+  if (subdivision.uv) add("--subdivide-uv", name_of(*subdivision.uv));
 }
 
 std::vector<std::string> bake_command(const RenderOptions& options, const SceneBakeOptions& bake) {
@@ -80,6 +95,7 @@ std::vector<std::string> bake_command(const RenderOptions& options, const SceneB
                                       "--no-warnings"};  // said here, from the manifests
   if (bake.source_only) command.push_back("--source-only");
   add_fog_flags(bake.read.fog, command);
+  add_subdivision_flags(bake.subdivision, command);
   return command;
 }
 

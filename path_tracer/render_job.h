@@ -47,6 +47,7 @@ struct RenderOptions {
   AssemblyRule assemblies = AssemblyRule::Repeated;   ///< which subtrees of the scene are baked as one
   FogOptions fog;                                     ///< of a scene that is a volume alone
   Downsampling downsampling = Downsampling::Matched;  ///< of volumes that have to be baked
+  SubdivisionOptions subdivision;                     ///< of all meshes of the scene
   /// Command that bakes: called as BAKER bake SCENE --scene -o LIBRARY ... Empty: this very program.
   std::filesystem::path baker;
   std::function<void(const std::string& line)> message;  ///< for a person who waits, one line each; may be empty

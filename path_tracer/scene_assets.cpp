@@ -64,6 +64,7 @@ BakeOptions asset_bake_options(const SceneBakeOptions& options, const GltfScene&
   if (!scene.meshes[mesh].volume.empty()) return bake;
   bake.import.node = scene.meshes[mesh].node;
   if (bake.import.node < 0) bake.import.mesh = static_cast<int>(mesh);
+  bake.import.subdivision = options.subdivision;
   bake.import.known_hashes = &hashes;
   return bake;
 }

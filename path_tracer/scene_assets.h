@@ -27,6 +27,7 @@ struct SceneBakeOptions {
   bool source_only = false;  ///< level 0 alone
   SceneOptions read;
   Downsampling downsampling = Downsampling::Matched;  ///< of volumes
+  SubdivisionOptions subdivision;                     ///< of all meshes
   /// Only each part_count-th asset, from number `part` on: for processes that share the work. part < part_count.
   uint32_t part = 0, part_count = 1;
 

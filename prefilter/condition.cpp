@@ -12,6 +12,7 @@
 #include "base/hash.h"
 #include "base/index.h"
 #include "base/result.h"
+#include "prefilter/subdivide.h"
 #include "prefilter/triangulate.h"
 #include "prefilter/weld.h"
 
@@ -236,7 +237,10 @@ std::vector<std::string> limit(std::vector<std::string> warnings) {
 tl::unexpected<Error> cancelled() { return make_error(ErrorCode::Cancelled, "import: cancelled"); }
 
 Result<ImportedAsset> condition_mesh(SourceMesh& mesh, const std::string& name, const Job& job) {
-  const std::vector<uint32_t> source_face = drop_faces_that_are_not_finite(mesh);
+  std::vector<uint32_t> source_face = drop_faces_that_are_not_finite(mesh);
+  if (!mesh.face_number.empty()) {
+    for (uint32_t& face : source_face) face = mesh.face_number[face];
+  }
   FARFIELD_TRY_LET(const auto origin, choose_origin(mesh, name));
   std::vector<vec3> positions;
   positions.reserve(mesh.positions.size());
@@ -276,7 +280,8 @@ Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name, const 
 }
 
 Result<ImportedAsset> import_asset(const fs::path& path, const ImportOptions& options, const Job& job) {
-  FARFIELD_TRY_LET(auto mesh, read_source(path, options));
+  FARFIELD_TRY_LET(auto cage, read_source(path, options));
+  FARFIELD_TRY_LET(auto mesh, subdivide(std::move(cage), options.subdivision, path.string(), job));
   return condition(std::move(mesh), path.string(), job);
 }
 

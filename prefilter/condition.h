@@ -31,7 +31,7 @@ struct ImportedAsset {
 /// cannot work in), Cancelled; with the mesh's warnings.
 Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name, const Job& job = {});
 
-/// read_source(), which hears no cancel, and condition(). Errors: those of both.
+/// read_source(), which hears no cancel, subdivide() and condition(). Errors: those of all three.
 Result<ImportedAsset> import_asset(const std::filesystem::path& path, const ImportOptions& options = {},
                                    const Job& job = {});
 

@@ -44,6 +44,10 @@ BakeMesh to_mesh(const py::dict& fields, KeptArrays& arrays) {
   mesh.uv = to_attribute<2>(fields["uv"], arrays);
   mesh.normals = to_attribute<3>(fields["normals"], arrays);
   mesh.colors = to_attribute<4>(fields["colors"], arrays);
+  mesh.creases = to_rows<2, int64_t>(fields["creases"], arrays);
+  mesh.crease_sharpness = to_rows<1, double>(fields["crease_sharpness"], arrays);
+  mesh.sharp_points = to_rows<1, int64_t>(fields["sharp_points"], arrays);
+  mesh.point_sharpness = to_rows<1, double>(fields["point_sharpness"], arrays);
   return mesh;
 }
 
@@ -83,12 +87,24 @@ BakeFog to_fog(const py::dict& fields) {
   return fog;
 }
 
+/// Numbers as farfield/__init__.py has looked them up.
+BakeSubdivision to_subdivision(const py::dict& fields) {
+  BakeSubdivision subdivision;
+  subdivision.scheme = static_cast<BakeSubdivision::Scheme>(fields["subdivide"].cast<uint8_t>());
+  subdivision.boundary = static_cast<BakeSubdivision::Boundary>(fields["subdivide_boundary"].cast<uint8_t>());
+  subdivision.uv = static_cast<BakeSubdivision::Uv>(fields["subdivide_uv"].cast<uint8_t>());
+  subdivision.error = fields["subdivide_error"].cast<double>();
+  subdivision.edge = fields["subdivide_edge"].cast<double>();
+  return subdivision;
+}
+
 BakeSettings to_settings(const py::dict& fields, LongCall& call, bool has_progress) {
   BakeSettings settings;
   settings.finest_grid = fields["finest_grid"].cast<uint32_t>();
   settings.coarsest_grid = fields["coarsest_grid"].cast<uint32_t>();
   settings.rays_per_voxel = fields["rays_per_voxel"].cast<uint32_t>();
   settings.source_only = fields["source_only"].cast<bool>();
+  settings.subdivision = to_subdivision(fields);
   settings.threads = fields["threads"].cast<int>();
   settings.memory_limit_bytes = fields["memory_limit_bytes"].cast<uint64_t>();
   settings.fog = to_fog(fields);

@@ -18,6 +18,7 @@
 #include "tools/interrupt.h"
 #include "tools/progress.h"
 #include "tools/report_json.h"
+#include "tools/subdivision_flags.h"
 
 namespace farfield::tool {
 namespace {
@@ -75,6 +76,7 @@ Result<void> bake_scene(const BakeArguments& arguments) {
   options.rays_per_voxel = arguments.options.rays_per_voxel;
   options.source_only = arguments.options.source_only;
   options.read = {arguments.assemblies, arguments.options.import.fog};
+  options.subdivision = arguments.options.import.subdivision;
   options.downsampling = arguments.options.downsampling;
   options.part = arguments.part.number;
   options.part_count = arguments.part.count;
@@ -121,9 +123,12 @@ std::vector<std::string> flags_without_use(const BakeArguments& arguments) {
   if (is_volume_file(arguments.source)) {
     const BakeOptions usual;
     const BakeOptions& options = arguments.options;
-    if (options.finest_grid == usual.finest_grid && options.rays_per_voxel == usual.rays_per_voxel) return {};
-    return {fmt::format("{}: --finest-grid and --rays-per-voxel are for models; a volume's grid is its own",
-                        arguments.source)};
+    if (options.finest_grid == usual.finest_grid && options.rays_per_voxel == usual.rays_per_voxel &&
+        options.import.subdivision.scheme == SubdivisionScheme::None)
+      return {};
+    return {
+        fmt::format("{}: --finest-grid, --rays-per-voxel and --subdivide are for models; a volume's grid is its own",
+                    arguments.source)};
   }
   if (canonical_text(arguments.options.import.fog).empty()) return {};
   return {fmt::format("{}: is no volume; flags of volumes change nothing", arguments.source)};
@@ -194,6 +199,7 @@ void add_bake_command(CLI::App& app, Action& action) {
   command->add_option("--parent", arguments->parent, "Process to end with")->group("");  // for render and shot
   add_fog_flags(command, options.import.fog);
   add_downsampling_flag(command, options.downsampling);
+  add_subdivision_flags(command, options.import.subdivision);
   command->add_flag("--source-only", options.source_only, "Write level 0 only: the source, ready to render");
   command->add_option("--threads", arguments->threads, "0: as many as the machine has")
       ->check(CLI::Range(0, 4096))
@@ -203,6 +209,7 @@ void add_bake_command(CLI::App& app, Action& action) {
   command->add_option("--report", arguments->report, "Write what was done, with seconds per stage, as JSON");
   command->footer(
       "Example:\n  farfield bake oak.obj.gz -o oak.farfield --finest-grid 512\n"
+      "  farfield bake character.obj -o character.farfield --subdivide catmull-clark\n"
       "  farfield bake cloud.vdb -o cloud.farfield --density-scale 20 --albedo 0.999 --anisotropy 0.8");
   command->callback([arguments, &action] { action = [arguments] { return run_bake(*arguments); }; });
 }

@@ -15,6 +15,7 @@
 #include "tools/fog_flags.h"
 #include "tools/interrupt.h"
 #include "tools/progress.h"
+#include "tools/subdivision_flags.h"
 
 namespace farfield::tool {
 namespace {
@@ -112,6 +113,7 @@ void add_evaluate_command(CLI::App& app, Action& action) {
       ->check(CLI::Range(0, 1 << 30))
       ->excludes(mesh);
   add_fog_flags(command, options.import.fog);
+  add_subdivision_flags(command, options.import.subdivision);
   command->add_flag("--other-source", options.other_source,
                     "Compare with a model that it was not baked from, too; then no errors are kept");
   add_parsed_option(command, "--levels", arguments->levels, parse_level_range,

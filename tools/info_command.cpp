@@ -15,6 +15,7 @@
 #include "tools/interrupt.h"
 #include "tools/progress.h"
 #include "tools/source_text.h"
+#include "tools/subdivision_flags.h"
 #include "tools/volume_text.h"
 
 namespace farfield::tool {
@@ -80,6 +81,7 @@ void add_info_command(CLI::App& app, Action& action) {
       ->check(CLI::Range(0, 1 << 30))
       ->excludes(mesh);
   add_fog_flags(command, arguments->import.fog);
+  add_subdivision_flags(command, arguments->import.subdivision);
   command->add_flag("--json", arguments->as_json, "Print JSON");
   command->footer("Example:\n  farfield info oak.farfield\n  farfield info oak.obj.gz");
   command->callback([arguments, &action] { action = [arguments] { return run_info(*arguments); }; });

@@ -16,6 +16,7 @@
 #include "tools/fog_flags.h"
 #include "tools/interrupt.h"
 #include "tools/progress.h"
+#include "tools/subdivision_flags.h"
 
 namespace farfield::tool {
 namespace {
@@ -107,6 +108,7 @@ void add_level_flags(CLI::App* command, RenderOptions& options) {
       ->default_str(fmt::format("{}", options.finest_grid));
   add_fog_flags(command, options.fog);
   add_downsampling_flag(command, options.downsampling);
+  add_subdivision_flags(command, options.subdivision);
   add_parsed_option(command, "--rays-per-voxel", options.rays_per_voxel, parse_rays_per_voxel,
                     "Of assets that have to be baked: what each voxel's density is measured with")
       ->default_str(fmt::format("{}", options.rays_per_voxel));

@@ -91,6 +91,34 @@ struct BakeMesh {
   BakeAttribute<2> uv;    ///< texture coordinates; v points down the image: (0, 0) is its upper left corner
   BakeAttribute<3> normals;  ///< for shading, any length; a normal of length 0 is the face's own
   BakeAttribute<4> colors;   ///< linear RGBA; multiply the material's base colour and alpha
+  // Of a cage (BakeSubdivision) only:
+  BakeRows<2> creases;           ///< the two points of each edge that is to stay sharp; a face must have that edge
+  BakeRows<1> crease_sharpness;  ///< one for each: >= 0, 0 is smooth, 10 and more (also infinite) sharp for ever
+  BakeRows<1> sharp_points;      ///< points that are to stay sharp
+  BakeRows<1> point_sharpness;   ///< one for each, as of creases
+};
+
+/// Takes all meshes for cages of subdivision surfaces: level 0 is their limit surface, with its own normals. Texture
+/// coordinates and colours are smoothed with it; the cage's normals are ignored. Faces keep the cage's numbers.
+/// [Catmull and Clark 1978] [Loop 1987], as OpenSubdiv has them.
+struct BakeSubdivision {
+  enum class Scheme : uint8_t {
+    None,          ///< the polygons are the surface
+    CatmullClark,  ///< any polygons; made for quads
+    Loop,          ///< triangles only
+  };
+  enum class Boundary : uint8_t {
+    EdgeAndCorner,  ///< rims follow their edges; points of one face stay where they are
+    EdgeOnly,       ///< corners of rims are rounded, too
+  };
+  enum class Uv : uint8_t { None, CornersOnly, CornersPlus1, CornersPlus2, Boundaries, All };
+
+  Scheme scheme = Scheme::None;
+  Boundary boundary = Boundary::EdgeAndCorner;
+  Uv uv = Uv::CornersPlus1;  ///< where texture coordinates stay linear: OpenSubdiv's and USD's rules
+  double error = 0.125;      ///< how far faces may lie from the limit surface, > 0, in voxels of level 0 (half of
+                             ///< level 1's)
+  double edge = 0;           ///< the longest that sides of faces may be, in such voxels; 0: what `error` gives
 };
 
 /// A place of a mesh in the asset. The asset holds all of them as one thing.
@@ -187,6 +215,7 @@ struct BakeSettings {
   uint32_t coarsest_grid = 8;     ///< the same of the last level, the root; <= finest_grid
   uint32_t rays_per_voxel = 200;  ///< that measure each voxel's occlusion, >= 1
   bool source_only = false;       ///< level 0 only: the source, ready to render
+  BakeSubdivision subdivision;    ///< of all meshes
   BakeFog fog;                    ///< of volumes alone; their grids are their own: finest_grid is not looked at
   BakeDownsampling downsampling = BakeDownsampling::Matched;
   int threads = 0;                  ///< 0: as many as the machine has
@@ -219,7 +248,8 @@ struct BakeSummary {
 /// goes on where it stopped. `memory_limit_bytes` is looked at a hundred times a second: it ends a bake that needs
 /// more, and does not make one need less. Errors: InvalidArgument (the input: counts, indices, numbers, names mesh and
 /// element; the settings; a folder that holds other things), NotFound, BadFile, Unsupported (a texture; an extent
-/// outside [1e-6, 1e9]), OutOfBudget (the memory limit), Io, Cancelled. Any thread, one call at a time in a process.
+/// outside [1e-6, 1e9]; a cage with more than 2048 faces around a point or corners of a face), OutOfBudget (the memory
+/// limit), Io, Cancelled. Any thread, one call at a time in a process.
 FARFIELD_API Result<BakeSummary> bake_meshes(const BakeInput& input, const std::string& folder,
                                              const BakeSettings& settings = {});
 

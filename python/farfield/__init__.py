@@ -60,6 +60,9 @@ class Mesh:
     points: (n, 3). faces: (m, k) integers, or a list of faces of any lengths, or flat with `counts`, the number of
     corners of each face. uv (.., 2), normals (.., 3; of length 0: the face's own) and colors (.., 3 or 4; linear) have
     a row per point or per corner; of shape (m, k, ..) they are per corner. material_ids: one per face; without them 0.
+
+    Of a cage, which is baked with subdivide=...: creases (n, 2) are pairs of points whose edge stays sharp, sharp_points
+    (n,) points; their sharpness is a number or one each: 0 is smooth, 10 and more is sharp for ever.
     """
 
     points: npt.ArrayLike
@@ -70,6 +73,10 @@ class Mesh:
     colors: npt.ArrayLike | None = None
     material_ids: npt.ArrayLike | None = None
     name: str = ""
+    creases: npt.ArrayLike | None = None
+    crease_sharpness: npt.ArrayLike | float = float("inf")
+    sharp_points: npt.ArrayLike | None = None
+    point_sharpness: npt.ArrayLike | float = float("inf")
 
     def _arrays(self) -> dict[str, Any]:
         points = _arrays.rows(self.points, 3, "points")
@@ -88,6 +95,7 @@ class Mesh:
             "uv": attribute("uv", 2),
             "normals": attribute("normals", 3),
             "colors": attribute("colors", 4),
+            **_arrays.creases(self.creases, self.crease_sharpness, self.sharp_points, self.point_sharpness),
         }
 
 
@@ -103,6 +111,11 @@ def bake(
     coarsest_grid: int = 8,
     rays_per_voxel: int = 200,
     source_only: bool = False,
+    subdivide: str = "none",
+    subdivide_error: float = 0.125,
+    subdivide_edge: float = 0,
+    subdivide_boundary: str = "edge-and-corner",
+    subdivide_uv: str = "corners-plus1",
     threads: int = 0,
     memory_limit: int = 0,
     progress: Progress | None = None,
@@ -120,6 +133,12 @@ def bake(
     roughness, transmission, opacity, normal, emission: called from several threads in turn, some 15 microseconds each,
     dozens of times per face (see `batched`); the same query must get the same answer. material_key stands for its answers: without one, every call bakes anew.
 
+    subdivide: "catmull-clark" or "loop" (triangles only) takes all meshes for cages: level 0 is their limit surface.
+    subdivide_error: how far its faces may lie from it, in voxels of level 0. subdivide_edge: the longest that their sides
+    may be, in such voxels; 0 is what the error gives. subdivide_boundary: "edge-and-corner" or "edge-only".
+    subdivide_uv: where texture coordinates stay linear: "none", "corners-only", "corners-plus1", "corners-plus2",
+    "boundaries", "all".
+
     memory_limit: bytes that the process may grow by; 0 is no limit. progress: called with (done in [0, 1], stage); what
     it raises ends the bake. Ctrl-C ends it too; the next call goes on from there.
     """
@@ -131,6 +150,7 @@ def bake(
         except ValueError as unfit:
             raise ValueError(f"mesh {i}{f' ({mesh.name})' if mesh.name else ''}: {unfit}") from None
     settings = _settings(coarsest_grid, source_only, threads, memory_limit, finest_grid, rays_per_voxel)
+    settings |= _subdivision(subdivide, subdivide_error, subdivide_edge, subdivide_boundary, subdivide_uv)
     placed = _arrays.instances(instances, len(all_meshes))
     looks = _arrays.materials(materials)
     return _farfield.bake_meshes(os.fspath(out), name, arrays, placed, looks, material_key, settings, progress)
@@ -151,6 +171,11 @@ def bake_file(
     level_set: bool = False,
     downsampling: str = "matched",
     source_only: bool = False,
+    subdivide: str = "none",
+    subdivide_error: float = 0.125,
+    subdivide_edge: float = 0,
+    subdivide_boundary: str = "edge-and-corner",
+    subdivide_uv: str = "corners-plus1",
     threads: int = 0,
     memory_limit: int = 0,
     progress: Progress | None = None,
@@ -160,6 +185,7 @@ def bake_file(
     fog volume), level_set (take one for the fog inside it), and what bake_volume() has; their grids are their own."""
     settings = _settings(coarsest_grid, source_only, threads, memory_limit, finest_grid, rays_per_voxel)
     settings |= _fog(density_scale, albedo, anisotropy, downsampling, density_grid, level_set)
+    settings |= _subdivision(subdivide, subdivide_error, subdivide_edge, subdivide_boundary, subdivide_uv)
     return _farfield.bake_file(os.fspath(source), os.fspath(out), mesh, settings, progress)
 
 
@@ -239,6 +265,26 @@ def _fog(
         "anisotropy": anisotropy,
         "level_set": level_set,
         "downsampling": downsampling,
+    }
+
+
+_SCHEMES = ("none", "catmull-clark", "loop")
+_BOUNDARIES = ("edge-and-corner", "edge-only")
+_UV_RULES = ("none", "corners-only", "corners-plus1", "corners-plus2", "boundaries", "all")
+
+
+def _subdivision(scheme: str, error: float, edge: float, boundary: str, uv: str) -> dict[str, Any]:
+    def number(name: str, value: str, names: tuple[str, ...]) -> int:
+        if value not in names:
+            raise ValueError(f"{name} is {value!r}, which is none of {', '.join(names)}")
+        return names.index(value)
+
+    return {
+        "subdivide": number("subdivide", scheme, _SCHEMES),
+        "subdivide_boundary": number("subdivide_boundary", boundary, _BOUNDARIES),
+        "subdivide_uv": number("subdivide_uv", uv, _UV_RULES),
+        "subdivide_error": error,
+        "subdivide_edge": edge,
     }
 
 

@@ -79,6 +79,29 @@ def attribute(values: Any, columns: int, points: int, corners: Array, what: str)
     raise ValueError(f"{what}: {len(array)} rows for {points} points and {len(corners)} corners")
 
 
+def creases(edges: Any, edge_sharpness: Any, points: Any, point_sharpness: Any) -> dict[str, Array | None]:
+    """What stays sharp of a cage: pairs of points, points, and a sharpness for each."""
+
+    def sharpness(values: Any, count: int, what: str) -> Array:
+        array = np.asarray(values, dtype=np.float64)
+        if array.ndim == 0:
+            return np.full(count, array)
+        if array.shape != (count,):
+            raise ValueError(f"{what}: a number, or {count} of them, not an array of shape {array.shape}")
+        return np.ascontiguousarray(array)
+
+    pairs = None if edges is None else integers(edges, "creases")
+    if pairs is not None and pairs.size and (pairs.ndim != 2 or pairs.shape[1] != 2):
+        raise ValueError(f"creases: an array of shape (n, 2), not {pairs.shape}")
+    sharp = None if points is None else integers(points, "sharp_points").ravel()
+    return {
+        "creases": pairs,
+        "crease_sharpness": None if pairs is None else sharpness(edge_sharpness, len(pairs), "crease_sharpness"),
+        "sharp_points": sharp,
+        "point_sharpness": None if sharp is None else sharpness(point_sharpness, len(sharp), "point_sharpness"),
+    }
+
+
 def matrix(values: Any, what: str) -> Array:
     """The upper 3 x 4 part of a transform, for column vectors: the last column is the translation."""
     array = np.asarray(values, dtype=np.float64)

@@ -53,6 +53,29 @@ class Bake(InAFolder):
         self.assertEqual(report["warnings"], [])
         self.assertTrue(farfield.bake(farfield.Mesh(self.points, self.quads), self.out, **SMALL)["up_to_date"])
 
+    def test_makes_cages_smooth(self):
+        corners = np.array([[x, y, z] for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)], dtype=float)
+        faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+        edges = [[0, 1], [1, 3], [3, 2], [2, 0], [4, 5], [5, 7], [7, 6], [6, 4], [0, 4], [1, 5], [2, 6], [3, 7]]
+
+        def triangles(mesh, **options):
+            options = {"subdivide": "catmull-clark", "source_only": True} | SMALL | options
+            return farfield.bake(mesh, self.out, **options)["levels"][0]["triangles"]
+
+        smooth = triangles(farfield.Mesh(corners, faces))
+        self.assertGreater(smooth, 100)
+        self.assertLess(triangles(farfield.Mesh(corners, faces), subdivide_error=1), smooth)
+        self.assertGreater(triangles(farfield.Mesh(corners, faces), subdivide_edge=0.5), smooth)
+        self.assertEqual(triangles(farfield.Mesh(corners, faces, creases=edges)), 12)
+        self.assertGreater(triangles(farfield.Mesh(corners, faces, creases=edges, crease_sharpness=np.ones(12))), 100)
+        self.assertGreater(triangles(farfield.Mesh(corners, faces, sharp_points=[0, 7], point_sharpness=2)), 100)
+        with self.assertRaisesRegex(ValueError, "subdivide is 'catmark'"):
+            triangles(farfield.Mesh(corners, faces), subdivide="catmark")
+        with self.assertRaisesRegex(ValueError, "crease_sharpness: a number, or 12"):
+            triangles(farfield.Mesh(corners, faces, creases=edges, crease_sharpness=[1, 2]))
+        with self.assertRaisesRegex(farfield.Error, "crease 0 lies between points 0 and 7"):
+            triangles(farfield.Mesh(corners, faces, creases=[[0, 7]]))
+
     def test_takes_faces_in_every_form(self):
         flat = farfield.Mesh(self.points, self.quads.ravel(), counts=[4] * 16)
         lists = farfield.Mesh(self.points.tolist(), self.quads.tolist())

@@ -300,5 +300,71 @@ TEST_F(BakeApi, RefusesWhatItCannotDo) {
   EXPECT_EQ(bake_file(folder_.path() / "none.obj", out()).error().code, ErrorCode::NotFound);
 }
 
+/// [-1, 1]^3, three of whose edges may be sharp. Owns what `input` looks at.
+struct Cube {
+  std::vector<vec3> points;
+  std::vector<uint32_t> corners = {0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4, 2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5};
+  std::vector<int> counts = std::vector<int>(6, 4);
+  std::vector<glm::ivec2> creases = {{0, 1}, {1, 3}, {3, 2}, {2, 0}};
+  std::vector<float> sharpness = std::vector<float>(4, 10.0f);
+
+  Cube() {
+    for (int i = 0; i < 8; ++i) points.emplace_back(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1);
+  }
+  BakeInput input(bool creased) const {
+    BakeInput input;
+    input.meshes.resize(1);
+    input.meshes[0].points = points;
+    input.meshes[0].corners = corners;
+    input.meshes[0].counts = counts;
+    if (creased) {
+      input.meshes[0].creases = creases;
+      input.meshes[0].crease_sharpness = sharpness;
+    }
+    return input;
+  }
+};
+
+TEST(BakeApiCage, IsBakedSmooth) {
+  const Cube cube;
+  const test::TemporaryFolder folder;
+  const std::string out = (folder.path() / "cube.farfield").string();
+  BakeSettings settings;
+  settings.finest_grid = 32;
+  settings.source_only = true;
+  const auto flat = bake_meshes(cube.input(false), out, settings);
+  ASSERT_TRUE(flat) << flat.error().message;
+  EXPECT_EQ(flat->levels[0].triangles, 12u);
+  settings.subdivision.scheme = BakeSubdivision::Scheme::CatmullClark;
+  const auto smooth = bake_meshes(cube.input(false), out, settings);
+  ASSERT_TRUE(smooth) << smooth.error().message;
+  EXPECT_GT(smooth->levels[0].triangles, 200u);
+  EXPECT_TRUE(smooth->warnings.empty());
+  EXPECT_TRUE(bake_meshes(cube.input(false), out, settings)->is_up_to_date);
+  const auto creased = bake_meshes(cube.input(true), out, settings);
+  ASSERT_TRUE(creased) << creased.error().message;
+  EXPECT_FALSE(creased->is_up_to_date) << "creases are part of the input";
+  settings.subdivision.error = 1;
+  const auto coarse = bake_meshes(cube.input(true), out, settings);
+  ASSERT_TRUE(coarse) << coarse.error().message;
+  EXPECT_FALSE(coarse->is_up_to_date);
+  EXPECT_LT(coarse->levels[0].triangles, creased->levels[0].triangles);
+}
+
+TEST(BakeApiCage, RefusesSubdivisionsThatMakeNoSense) {
+  const Cube cube;
+  const test::TemporaryFolder folder;
+  const std::string out = (folder.path() / "cube.farfield").string();
+  BakeSettings settings;
+  settings.subdivision.scheme = BakeSubdivision::Scheme::Loop;  // of quads
+  EXPECT_EQ(code_of(bake_meshes(cube.input(false), out, settings)), ErrorCode::InvalidArgument);
+  settings.subdivision.scheme = static_cast<BakeSubdivision::Scheme>(7);
+  EXPECT_EQ(code_of(bake_meshes(cube.input(false), out, settings)), ErrorCode::InvalidArgument);
+  settings.subdivision.scheme = BakeSubdivision::Scheme::CatmullClark;
+  settings.subdivision.error = -1;
+  EXPECT_EQ(code_of(bake_meshes(cube.input(false), out, settings)), ErrorCode::InvalidArgument);
+  EXPECT_FALSE(fs::exists(out));
+}
+
 }  // namespace
 }  // namespace farfield

@@ -194,5 +194,50 @@ TEST(GatherMesh, RefusesNothing) {
   EXPECT_NE(error_of(input).find("no face"), std::string::npos);
 }
 
+TEST(GatherMesh, CopiesCreasesOfEveryInstance) {
+  House house;
+  const std::vector<glm::ivec2> creases = {{3, 2}, {4, 3}};
+  const std::vector<double> sharpness = {2.5, std::numeric_limits<double>::infinity()};
+  const std::vector<int> points = {4};
+  const std::vector<float> point_sharpness = {1};
+  BakeInput input = house.input();
+  input.meshes[0].creases = creases;
+  input.meshes[0].crease_sharpness = sharpness;
+  input.meshes[0].sharp_points = points;
+  input.meshes[0].point_sharpness = point_sharpness;
+  input.instances.resize(2);
+  const CageTags cage = gather_mesh(input).value().cage;
+  EXPECT_EQ(cage.crease_edges, (std::vector<glm::uvec2>{{3, 2}, {4, 3}, {8, 7}, {9, 8}}));
+  ASSERT_EQ(cage.crease_sharpness.size(), 4u);
+  EXPECT_EQ(cage.crease_sharpness[2], 2.5f);
+  EXPECT_GE(cage.crease_sharpness[3], kInfiniteSharpness);
+  EXPECT_EQ(cage.sharp_vertices, (std::vector<uint32_t>{4, 9}));
+  EXPECT_EQ(cage.vertex_sharpness, (std::vector<float>{1, 1}));
+}
+
+TEST(GatherMesh, NamesTheCreaseThatIsWrong) {
+  House house;
+  const auto error = [&](const std::vector<glm::ivec2>& creases, const std::vector<double>& sharpness,
+                         const std::vector<double>& points, const std::vector<double>& point_sharpness) {
+    BakeInput input = house.input();
+    input.meshes[0].creases = creases;
+    input.meshes[0].crease_sharpness = sharpness;
+    input.meshes[0].sharp_points = points;
+    input.meshes[0].point_sharpness = point_sharpness;
+    return error_of(input);
+  };
+  EXPECT_EQ(error({{0, 1}}, {1}, {}, {}), "");
+  EXPECT_NE(error({{0, 1}, {0, 2}}, {1, 1}, {}, {}).find("(house): crease 1 lies between points 0 and 2"),
+            std::string::npos);
+  EXPECT_NE(error({{0, 99}}, {1}, {}, {}).find("crease 0"), std::string::npos);
+  EXPECT_NE(error({{-1, 0}}, {1}, {}, {}).find("crease 0"), std::string::npos);
+  EXPECT_NE(error({{0, 1}}, {}, {}, {}).find("0 values of sharpness for 1 creases"), std::string::npos);
+  EXPECT_NE(error({{0, 1}}, {-1}, {}, {}).find("sharpness 0 of its creases is -1"), std::string::npos);
+  EXPECT_NE(error({{0, 1}}, {NAN}, {}, {}).find("sharpness 0 of its creases is nan"), std::string::npos);
+  EXPECT_NE(error({}, {}, {5}, {1}).find("sharp point 0 is 5; there are points 0 to 4"), std::string::npos);
+  EXPECT_NE(error({}, {}, {1.5}, {1}).find("sharp point 0 is 1.5"), std::string::npos);
+  EXPECT_NE(error({}, {}, {0}, {1, 2}).find("2 values of sharpness for 1 sharp points"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace farfield

@@ -72,5 +72,65 @@ TEST(Obj, WhatIsNoSurfaceIsSaidOnceWithItsLine) {
   EXPECT_EQ(mesh.warnings, wanted);
 }
 
+// ---- subdivision cages
+
+TEST(Obj, TagsOfCagesAreRead) {
+  const SourceMesh mesh =
+      read_text("a.obj", kBend + "f 1 2 3 4\nf 2 5 6 3\nt crease 2/1/0 1 2 2.5\nt crease 4/2/0 0 1 2 3 1 inf\n" +
+                             "t corner 2/1/0 0 3 10\nt hole 1/0/0 1\nt interpolateboundary 1/0/0 2\n" +
+                             "t facevaryinginterpolateboundary 1/0/0 4\nt creasemethod 0/0/1 chaikin\n");
+  const CageTags& cage = mesh.cage;
+  EXPECT_EQ(cage.crease_edges, (std::vector<glm::uvec2>{{1, 2}, {0, 1}, {2, 3}}));
+  EXPECT_EQ(cage.crease_sharpness, (std::vector<float>{2.5f, 1, std::numeric_limits<float>::infinity()}));
+  EXPECT_EQ(cage.sharp_vertices, (std::vector<uint32_t>{0, 3}));
+  EXPECT_EQ(cage.vertex_sharpness, (std::vector<float>{10, 10}));
+  EXPECT_EQ(cage.holes, (std::vector<uint32_t>{1}));
+  EXPECT_EQ(cage.boundary, CageBoundary::EdgeOnly);
+  EXPECT_EQ(cage.uv, CageUv::Boundaries);
+  EXPECT_EQ(cage.creasing, CageCreasing::Chaikin);
+  EXPECT_TRUE(mesh.warnings.empty());
+}
+
+TEST(Obj, BadTagsAreSaidWithTheirLine) {
+  for (const char* tag : {"t",
+                          "t crease",
+                          "t crease 2/1 0 1 1",
+                          "t crease 2/1/0 0 1",
+                          "t crease 2/1/0 0 -1 1",
+                          "t crease 3/1/0 0 1 2 1",
+                          "t crease 0/1/0 1",
+                          "t crease 2/1/0 0 1 -1",
+                          "t crease 2/1/0 0 1 nan",
+                          "t crease 4/3/0 0 1 1 2 1 2 3",
+                          "t crease 99999999999999999999/1/0 0 1 1",
+                          "t corner 0/1/0 1",
+                          "t corner 1/1/0 0 -3",
+                          "t corner 1/0/0 0",
+                          "t interpolateboundary 1/0/0 3",
+                          "t interpolateboundary 0/0/0",
+                          "t facevaryinginterpolateboundary 1/0/0 6",
+                          "t creasemethod 0/0/1 odd",
+                          "t creasemethod 0/0/2 normal",
+                          "t vertexedit 1/1/0 0 1"}) {
+    const SourceMesh mesh = read_text("a.obj", kBend + tag + "\nf 1 2 3 4\n");
+    EXPECT_TRUE(mesh.cage.empty()) << tag;
+    EXPECT_EQ(mesh.face_count(), 1u) << tag;
+    ASSERT_EQ(mesh.warnings.size(), 1u) << tag;
+    EXPECT_EQ(mesh.warnings[0].find("line 7: t "), 0u) << mesh.warnings[0];
+  }
+}
+
+TEST(Obj, TagsOfWhatDoesNotExistAreIgnored) {
+  const SourceMesh mesh = read_text("a.obj", kBend +
+                                                 "f 1 2 99\nf 1 2 3 4\nf 2 5 6 3\nt crease 2/1/0 0 6 1\n"
+                                                 "t corner 2/2/0 0 77 1 2\nt hole 4/0/0 0 2 3 7\n");
+  EXPECT_TRUE(mesh.cage.crease_edges.empty());
+  EXPECT_EQ(mesh.cage.sharp_vertices, (std::vector<uint32_t>{0}));
+  EXPECT_EQ(mesh.cage.vertex_sharpness, (std::vector<float>{1}));
+  EXPECT_EQ(mesh.cage.holes, (std::vector<uint32_t>{1})) << "face 2 of the file, whose face 0 was dropped";
+  ASSERT_EQ(mesh.warnings.size(), 2u);
+  EXPECT_NE(mesh.warnings[1].find("5 tags"), std::string::npos) << mesh.warnings[1];
+}
+
 }  // namespace
 }  // namespace farfield

@@ -490,5 +490,24 @@ TEST(Import, FlippedBytesLoadOrFailButNeverCrash) {
   }
 }
 
+TEST(ImportObj, CagesBecomeFacesThatKnowTheirFaceOfTheFile) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("fold.obj", std::string(kQuadObj) + "v 0 0 1\nv 1 0 1\nf 1 2 3 4\nf 2 1 5 6\n");
+  ImportOptions options;
+  options.subdivision.scheme = SubdivisionScheme::CatmullClark;
+  const auto asset = import_asset(file, options);
+  ASSERT_TRUE(asset) << asset.error().message;
+  const SourceSurface& surface = asset->source;
+  EXPECT_GT(surface.triangles.size(), 100u);
+  EXPECT_EQ(surface.corner_normal.size(), 3 * surface.triangles.size());
+  for (size_t t = 0; t < surface.triangles.size(); ++t) {
+    const vec3 middle = (surface.positions[surface.triangles[t].x] + surface.positions[surface.triangles[t].y] +
+                         surface.positions[surface.triangles[t].z]) /
+                        3.0f;
+    EXPECT_EQ(surface.source_face[t], middle.y > middle.z ? 0u : 1u);
+  }
+  EXPECT_NE(asset->source_hash, import_asset(file)->source_hash);
+}
+
 }  // namespace
 }  // namespace farfield

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// Flags of commands that read meshes, which may be subdivision cages. Includes CLI11: only for the commands' .cpp
+// files.
+#pragma once
+
+#include "import/subdivision_options.h"
+#include "tools/flags.h"
+
+namespace farfield::tool {
+
+/// What a mesh does not say itself.
+inline void add_subdivision_flags(CLI::App* command, SubdivisionOptions& options) {
+  CLI::Option* scheme =
+      add_parsed_option(
+          command, "--subdivide", options.scheme, parse_subdivision_scheme,
+          "Meshes are cages of smooth surfaces: catmull-clark, or loop (triangles only); none: as they are")
+          ->default_str("none");
+  command
+      ->add_option("--subdivide-error", options.error,
+                   "How far faces may lie from the smooth surface, in voxels of level 0 (half of level 1's)")
+      ->capture_default_str()
+      ->needs(scheme);
+  command
+      ->add_option("--subdivide-edge", options.edge,
+                   "The longest that sides of faces may be, in such voxels; 0: as the error allows")
+      ->capture_default_str()
+      ->needs(scheme);
+  add_parsed_option(command, "--subdivide-boundary", options.boundary, parse_cage_boundary,
+                    "Rims of open cages: edge-and-corner or edge-only. Without it the file's own, or edge-and-corner")
+      ->needs(scheme);
+  add_parsed_option(command, "--subdivide-uv", options.uv, parse_cage_uv,
+                    "Where texture coordinates stay linear: none, corners-only, corners-plus1, corners-plus2, "
+                    "boundaries, all. Without it the file's own, or corners-plus1")
+      ->needs(scheme);
+}
+
+}  // namespace farfield::tool
