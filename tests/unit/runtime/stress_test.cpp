@@ -140,7 +140,6 @@ void fly(Residency residency, Blend blend) {
     EXPECT_TRUE(is_said || seen == right) << frame;
   }
   EXPECT_GT(most_asked, kBudget);
-  RecordProperty("most_asked", std::to_string(most_asked));
   EXPECT_TRUE(reference->messages.empty()) << reference->messages.front();
   EXPECT_FALSE(host->messages.empty());  // some of the harm was met
   EXPECT_GT(hits, size_t{kFrames} * kRays / 20);
