@@ -580,12 +580,12 @@ TEST_F(WholeRoad, RenderAndShotOfAScene) {
 TEST_F(WholeRoad, WhyAPixelShowsWhatItShows) {
   test::write_bush_scene(path("scene.gltf"), 120);
   const auto ask = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> why = {"why",      path("scene.gltf"), "--frame",       "0",  "--size",   "48x32",
-                                    "--assets", path("assets"),     "--finest-grid", "32", "--budget", "64M"};
+    std::vector<std::string> why = {"why",      path("scene.gltf"), "--frame",       "0", "--size", "48x32",
+                                    "--assets", path("assets"),     "--finest-grid", "32"};
     why.insert(why.end(), more.begin(), more.end());
     return farfield(why);
   };
-  const ProcessOutput near = ask({"--pixel", "24,16", "--json"});
+  const ProcessOutput near = ask({"--pixel", "14,16", "--json"});
   ASSERT_EQ(near.exit_code, 0) << near.err;
   const Json json = Json::parse(near.out);
   ASSERT_GT(json["visits"].size(), 0u);
@@ -602,12 +602,12 @@ TEST_F(WholeRoad, WhyAPixelShowsWhatItShows) {
   EXPECT_EQ(rays, json["rays"]);
   EXPECT_TRUE(is_seen) << json["hits"];
 
-  const ProcessOutput text = ask({"--pixel", "24,16"});
+  const ProcessOutput text = ask({"--pixel", "14,16"});
   EXPECT_NE(text.out.find("lambda"), std::string::npos) << text.out;
   EXPECT_NE(text.out.find("nothing finer"), std::string::npos) << text.out;
-  const uint64_t planned = json["planned_bytes"];
-  const ProcessOutput poor =
-      ask({"--pixel", "24,16", "--pixel-error", "0.01", "--budget", std::to_string(planned * 9 / 10)});
+  const ProcessOutput fine = ask({"--pixel", "14,16", "--pixel-error", "0.01", "--json"});
+  const uint64_t asked = Json::parse(fine.out)["asked_bytes"];
+  const ProcessOutput poor = ask({"--pixel", "14,16", "--pixel-error", "0.01", "--budget", std::to_string(asked - 1)});
   EXPECT_NE(poor.out.find("nothing finer: the budget"), std::string::npos) << poor.out << poor.err;
   EXPECT_NE(ask({"--pixel", "0,0"}).out.find("meets no instance's bounds"), std::string::npos);
   expect_one_line_error(ask({"--pixel", "48,0"}), "48x32");

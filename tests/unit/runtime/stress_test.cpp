@@ -26,7 +26,7 @@ constexpr int kFrames = 12, kRays = 600;
 constexpr int kFrames = 60, kRays = 2000;
 #endif
 constexpr int kThreads = 4, kAssets = 3;
-constexpr uint64_t kBudget = 2 << 20;  // less than frames ask for
+constexpr uint64_t kBudget = 1200 << 10;  // less than frames ask for
 
 std::string name_of(int asset) { return "ball_" + std::to_string(asset) + ".farfield"; }
 
