@@ -27,11 +27,19 @@ void write_asset(const std::filesystem::path& folder, const std::vector<LevelDat
 }
 
 Host::Host(RuntimeOptions options) : device_(*make_embree_device()) {
-  options.messages = [this](Severity, const std::string& message) { messages.push_back(message); };
+  options.messages = [this](Severity, const std::string& message) {
+    const std::lock_guard lock(messages_mutex_);
+    messages.push_back(message);
+  };
   auto runtime = Runtime::create(device_.get(), options);
   if (!runtime) ADD_FAILURE() << runtime.error().message;
   FARFIELD_CHECK(runtime.has_value());
   runtime_ = std::move(*runtime);
+}
+
+size_t Host::message_count() const {
+  const std::lock_guard lock(messages_mutex_);
+  return messages.size();
 }
 
 AssetId Host::add(const std::filesystem::path& folder, const std::vector<mat4x3>& transforms) {

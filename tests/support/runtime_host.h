@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -36,8 +37,11 @@ class Host {
   }
 
   std::vector<std::string> messages;
+  /// While levels may be loading ahead, in a thread of the runtime's own, which adds to them.
+  size_t message_count() const;
 
  private:
+  mutable std::mutex messages_mutex_;
   EmbreeDevice device_;
   std::unique_ptr<Runtime> runtime_;
   EmbreeScene scene_;

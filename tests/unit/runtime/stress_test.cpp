@@ -7,6 +7,7 @@
 #include <atomic>
 #include <thread>
 
+#include "base/parallel.h"
 #include "base/random.h"
 #include "farfield/runtime.h"
 #include "tests/support/files.h"
@@ -113,6 +114,9 @@ std::unique_ptr<Host> open(const fs::path& folder, Residency residency, Blend bl
 }
 
 void fly(Residency residency, Blend blend) {
+#ifdef __SANITIZE_THREAD__
+  const ThreadLimit no_workers(1);  // TBB and Embree are not instrumented: how their workers wait is not seen
+#endif
   const test::TemporaryFolder folder;
   const fs::path sound = folder.path() / "sound", damaged = folder.path() / "damaged";
   for (int i = 0; i < kAssets; ++i) test::write_asset(sound / name_of(i), test::white_sphere(48));
@@ -136,12 +140,12 @@ void fly(Residency residency, Blend blend) {
     vandal.join();
     const std::vector<Seen> right = look(*reference, frame, eye);
     for (const Seen& ray : right) hits += ray.t > 0;
-    const bool is_said = !host->messages.empty() || host->runtime().stats().fallbacks > 0;
+    const bool is_said = host->message_count() > 0 || host->runtime().stats().fallbacks > 0;
     EXPECT_TRUE(is_said || seen == right) << frame;
   }
   EXPECT_GT(most_asked, kBudget);
   EXPECT_TRUE(reference->messages.empty()) << reference->messages.front();
-  EXPECT_FALSE(host->messages.empty());  // some of the harm was met
+  EXPECT_GT(host->message_count(), 0u);  // some of the harm was met
   EXPECT_GT(hits, size_t{kFrames} * kRays / 20);
   EXPECT_GT(reference->runtime().stats().levels_released, uint64_t{kFrames} / 4);
   for (Host* each : {reference.get(), host.get()}) EXPECT_LE(each->runtime().stats().peak_accounted_bytes, kBudget);
