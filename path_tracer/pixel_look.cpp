@@ -45,7 +45,7 @@ void count(const PixelHit& hit, std::vector<PixelHit>& hits) {
 
 std::vector<PixelLevel> levels_of(const Runtime& runtime, const RayVisit& visit) {
   const std::vector<LevelInfo>& infos = runtime.levels(visit.asset);
-  const std::vector<LevelStats> stats = runtime.level_stats(visit.asset);
+  const std::vector<LevelRecord> stats = runtime.level_stats(visit.asset);
   std::vector<PixelLevel> levels;
   for (size_t slot = 0; slot < infos.size(); ++slot) {
     levels.push_back({infos[slot].level, std::ldexp(visit.level_0_footprint, static_cast<int>(infos[slot].level)),

@@ -119,21 +119,21 @@ Result<PlanSummary> RenderSession::plan(std::span<const Camera> camera, const Re
   return runtime_->plan_frame();
 }
 
-std::vector<std::vector<LevelStats>> RenderSession::level_stats() const {
-  std::vector<std::vector<LevelStats>> stats;
+std::vector<std::vector<LevelRecord>> RenderSession::level_stats() const {
+  std::vector<std::vector<LevelRecord>> stats;
   for (const AssetId asset : assets_) stats.push_back(runtime_->level_stats(asset));
   return stats;
 }
 
 /// What happened to levels since `before`.
-std::vector<std::vector<LevelUse>> RenderSession::level_use(const std::vector<std::vector<LevelStats>>& before,
+std::vector<std::vector<LevelUse>> RenderSession::level_use(const std::vector<std::vector<LevelRecord>>& before,
                                                             const LevelHits& hits) const {
   std::vector<std::vector<LevelUse>> uses(assets_.size());
   for (size_t i = 0; i < assets_.size(); ++i) {
-    const std::vector<LevelStats> after = runtime_->level_stats(assets_[i]);
+    const std::vector<LevelRecord> after = runtime_->level_stats(assets_[i]);
     const std::vector<LevelInfo>& levels = runtime_->levels(assets_[i]);
     for (uint32_t slot = 0; slot < after.size(); ++slot) {
-      const LevelStats &then = before[i][slot], &now = after[slot];
+      const LevelRecord &then = before[i][slot], &now = after[slot];
       const LevelUse use{levels[slot].level,     hits.of(assets_[i].value, slot),
                          now.loads - then.loads, now.load_seconds - then.load_seconds,
                          now.resident_bytes,     now.fallbacks - then.fallbacks};
@@ -165,7 +165,7 @@ Result<FrameReport> RenderSession::render(std::span<const Camera> camera, const 
   const auto start = std::chrono::steady_clock::now();
   const double cpu_start = process_cpu_seconds();
   const Stats before = runtime_->stats();
-  const std::vector<std::vector<LevelStats>> levels_before = level_stats();
+  const std::vector<std::vector<LevelRecord>> levels_before = level_stats();
   FARFIELD_TRY_LET(auto plan, this->plan(camera, options));
   runtime_->prefetch();
   malloc_trim(0);  // what writing the last frame left in the heap is not the assets'

@@ -50,8 +50,8 @@ class RenderSession {
   Result<void> fill(EmbreeDeviceRef device, std::span<const std::filesystem::path> folders,
                     std::span<const GltfInstance> instances, const MaterialNames& names, bool is_small);
   Result<PlanSummary> plan(std::span<const Camera> camera, const RenderOptions& options);
-  std::vector<std::vector<LevelStats>> level_stats() const;
-  std::vector<std::vector<LevelUse>> level_use(const std::vector<std::vector<LevelStats>>& before,
+  std::vector<std::vector<LevelRecord>> level_stats() const;
+  std::vector<std::vector<LevelUse>> level_use(const std::vector<std::vector<LevelRecord>>& before,
                                                const LevelHits& hits) const;
   std::unique_ptr<Runtime> runtime_;
   std::vector<AssetId> assets_;  ///< that are shown, in the order of FrameReport::finest_level

@@ -44,7 +44,7 @@ RayVisit make_visit(const InstanceGeometry& geometry, uint32_t instance, const I
 
 }  // namespace
 
-std::vector<RayVisit> explain_ray(const InstanceGeometry& geometry, const RTCRay& ray, const RayContext& context) {
+std::vector<RayVisit> explain_ray(const InstanceGeometry& geometry, const EmbreeRay& ray, const RayContext& context) {
   std::vector<RayVisit> visits;
   for (uint32_t instance = 0; instance < geometry.instances.size(); ++instance) {
     if (const auto entry = geometry.entry_of(instance, ray, context))

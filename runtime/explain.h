@@ -10,6 +10,6 @@
 namespace farfield {
 
 /// See Runtime::explain().
-std::vector<RayVisit> explain_ray(const InstanceGeometry& geometry, const RTCRay& ray, const RayContext& context);
+std::vector<RayVisit> explain_ray(const InstanceGeometry& geometry, const EmbreeRay& ray, const RayContext& context);
 
 }  // namespace farfield

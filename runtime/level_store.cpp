@@ -270,9 +270,9 @@ uint64_t LevelStore::fallbacks() const {
   return sum;
 }
 
-std::vector<LevelStats> LevelStore::level_stats(uint32_t asset_index) const {
+std::vector<LevelRecord> LevelStore::level_stats(uint32_t asset_index) const {
   const OpenAsset& asset = *assets_[asset_index];
-  std::vector<LevelStats> stats;
+  std::vector<LevelRecord> stats;
   for (uint32_t slot = 0; slot < asset.traced.slot_count(); ++slot) {
     const size_t item = asset.items[slot];
     const ItemState state = levels_.state(item);

@@ -65,9 +65,9 @@ class LevelStore final : public LevelSource {
   void load_morph(uint32_t asset, uint32_t slot);
 
   ResidencyStats stats() const { return levels_.stats(); }
-  /// Of all levels: LevelStats::fallbacks.
+  /// Of all levels: LevelRecord::fallbacks.
   uint64_t fallbacks() const;
-  std::vector<LevelStats> level_stats(uint32_t asset) const;
+  std::vector<LevelRecord> level_stats(uint32_t asset) const;
 
  private:
   struct ItemOwner {

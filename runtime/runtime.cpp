@@ -338,8 +338,9 @@ AssetId Runtime::asset_of(InstanceId instance) const {
   return {impl_->has_instance(instance) ? impl_->geometry.instances[instance.value].asset : kNoInstance};
 }
 
-std::vector<LevelStats> Runtime::level_stats(AssetId asset) const {
-  return asset.value < impl_->levels.asset_count() ? impl_->levels.level_stats(asset.value) : std::vector<LevelStats>();
+std::vector<LevelRecord> Runtime::level_stats(AssetId asset) const {
+  return asset.value < impl_->levels.asset_count() ? impl_->levels.level_stats(asset.value)
+                                                   : std::vector<LevelRecord>();
 }
 
 std::vector<RayVisit> Runtime::explain(const RTCRay& ray, const RayContext& context) const {

@@ -132,7 +132,7 @@ struct RayVisit {
 };
 
 /// What a stored level has taken and given so far; see Runtime::level_stats().
-struct LevelStats {
+struct LevelRecord {
   uint64_t loads = 0;           ///< reloads included
   double load_seconds = 0;      ///< summed over loads: read, check, build
   uint64_t resident_bytes = 0;  ///< now; 0: not in memory
@@ -247,7 +247,7 @@ class FARFIELD_API Runtime {
   /// The asset of an instance; of one that there is not: {kNoInstance}.
   AssetId asset_of(InstanceId instance) const;
   /// Per stored level of the asset, finest first, as levels() has them; none for an id that open_asset() did not give.
-  std::vector<LevelStats> level_stats(AssetId asset) const;
+  std::vector<LevelRecord> level_stats(AssetId asset) const;
   /// Which instances' bounds a ray meets, nearest first, and with which level it would deal there under the current
   /// plan. Loads nothing; looks at every instance.
   std::vector<RayVisit> explain(const RTCRay& ray, const RayContext& context) const;

@@ -246,6 +246,7 @@ def _settings(
         "threads": threads,
         "memory_limit_bytes": memory_limit,
         **_fog(),
+        **_subdivision(),
     }
 
 
@@ -273,7 +274,10 @@ _BOUNDARIES = ("edge-and-corner", "edge-only")
 _UV_RULES = ("none", "corners-only", "corners-plus1", "corners-plus2", "boundaries", "all")
 
 
-def _subdivision(scheme: str, error: float, edge: float, boundary: str, uv: str) -> dict[str, Any]:
+def _subdivision(
+    scheme: str = "none", error: float = 0.125, edge: float = 0, boundary: str = "edge-and-corner",
+    uv: str = "corners-plus1"
+) -> dict[str, Any]:
     def number(name: str, value: str, names: tuple[str, ...]) -> int:
         if value not in names:
             raise ValueError(f"{name} is {value!r}, which is none of {', '.join(names)}")

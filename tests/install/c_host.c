@@ -127,7 +127,7 @@ int main(int argc, char** argv) {
   FfStats stats = FF_STATS_INIT;
   const FfInstanceData data = {42, {1, 1, 1}};
   float identity[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
-  const float keys[24] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1e5f};
+  const float keys[24] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1e5f, 0, 0};
   float lower[3], upper[3], eye[3], mean;
   uint32_t asset, instance;
   int seen;
