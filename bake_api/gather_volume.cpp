@@ -13,10 +13,8 @@
 namespace farfield {
 namespace {
 
-constexpr uint64_t kInputVersion = 1;            ///< goes up when the same input comes to mean something else
-constexpr uint64_t kMostVoxels = 0xfffffff0ull;  ///< of a level: payload indices have 32 bits
-constexpr uint32_t kLongestSide = 1u << 23;      ///< voxels: 2^20 bricks, the most that a level has along a side
-constexpr double kDensest = 1e30;                ///< times lengths and squares stay floats
+constexpr uint64_t kInputVersion = 1;        ///< goes up when the same input comes to mean something else
+constexpr uint32_t kLongestSide = 1u << 23;  ///< voxels: 2^20 bricks, the most that a level has along a side
 
 class VolumeGatherer {
  public:
@@ -104,14 +102,14 @@ class VolumeGatherer {
     FARFIELD_TRY(std::move(found));
     if (job_.is_cancelled()) return cancelled();
     if (out_.active_voxels == 0) return error("no voxel has a density: there is nothing to see");
-    if (out_.active_voxels <= kMostVoxels) return {};
+    if (out_.active_voxels <= kMostVolumeVoxels) return {};
     return make_error(ErrorCode::Unsupported, fmt::format("volume {}: more than {} million voxels; bake it in parts",
-                                                          given_.name, kMostVoxels / 1000000));
+                                                          given_.name, kMostVolumeVoxels / 1000000));
   }
 
   Result<void> check_voxel(size_t index, const uvec3& voxel) const {
     const double density = given_.density.at(index);
-    if (!(density >= 0) || !(density * fog_.density_scale <= kDensest))
+    if (!(density >= 0) || !(density * fog_.density_scale <= kDensestVolume))
       return error("the density of voxel ({}, {}, {}) is {}", voxel.x, voxel.y, voxel.z, density);
     if (given_.albedo.empty()) return {};
     for (int c = 0; c < 3; ++c) {

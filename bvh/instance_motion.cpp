@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/key_place.h"
+
 namespace farfield {
 
 namespace {
@@ -67,13 +69,11 @@ Result<InstanceMotion> InstanceMotion::make(std::span<const mat4x3> keys) {
 }
 
 InstanceRecord InstanceMotion::at(const InstanceRecord& record, float time) const {
-  const double segments = static_cast<double>(keys_.size() - 1);
-  const double place = time > 0.0f ? std::min(time, 1.0f) * segments : 0.0;  // NaN: the first key
-  const double first = std::min(std::floor(place), segments - 1.0);
-  const auto key = static_cast<size_t>(first);
-  const Transform now(Transform(keys_[key]), Transform(keys_[key + 1]), place - first);
+  const auto [key, t] = find_key_place(keys_.size(), time);
+  const Transform now(Transform(keys_[key]), Transform(keys_[key + 1]), t);
+  const glm::dmat3 inverse = glm::inverse(now.linear);
   InstanceRecord moved = record;
-  moved.set_transform(now.linear, now.translation);
+  moved.set_inverse(inverse, -(inverse * now.translation));
   return moved;
 }
 

@@ -35,12 +35,10 @@ mat3 InstanceRecord::linear_to_local() const {
   return glm::transpose(mat3(vec3(world_to_local[0]), vec3(world_to_local[1]), vec3(world_to_local[2])));
 }
 
-void InstanceRecord::set_transform(const glm::dmat3& linear, const glm::dvec3& translation) {
-  const glm::dmat3 inverse = glm::inverse(linear);
-  const glm::dvec3 back = -(inverse * translation);
+void InstanceRecord::set_inverse(const glm::dmat3& linear, const glm::dvec3& translation) {
   for (int row = 0; row < 3; ++row) {
     world_to_local[static_cast<size_t>(row)] =
-        vec4(glm::dvec4(inverse[0][row], inverse[1][row], inverse[2][row], back[row]));
+        vec4(glm::dvec4(linear[0][row], linear[1][row], linear[2][row], translation[row]));
   }
   handedness = glm::determinant(linear) < 0.0 ? -1 : 1;
 }
@@ -60,7 +58,7 @@ Result<InstanceRecord> make_instance(uint32_t asset, const mat4x3& local_to_worl
   }
   InstanceRecord record;
   record.asset = asset;
-  record.set_transform(linear, translation);
+  record.set_inverse(inverse, back);
   return record;
 }
 

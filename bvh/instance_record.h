@@ -33,8 +33,8 @@ struct alignas(64) InstanceRecord {
   vec3 normal_to_world(const vec3& n) const;
   /// The linear part of world_to_local.
   mat3 linear_to_local() const;
-  /// Of the linear part and the translation of local_to_world, whose determinant is not 0: the rows and handedness.
-  void set_transform(const glm::dmat3& linear, const glm::dvec3& translation);
+  /// The rows and the handedness, of world_to_local's linear part and translation; its determinant is not 0.
+  void set_inverse(const glm::dmat3& linear, const glm::dvec3& translation);
 };
 static_assert(sizeof(InstanceRecord) == 64);
 

@@ -10,6 +10,7 @@
 #include "base/file_io.h"
 #include "base/hash.h"
 #include "base/json_words.h"
+#include "base/text.h"
 #include "cache/json_reader.h"
 #include "cache/material_json.h"
 
@@ -39,9 +40,7 @@ bool is_plain_file_name(const std::string& name) {
 /// Text from a file as one short line of a message.
 std::string printable(std::string_view text) {
   constexpr size_t kLongest = 200;
-  std::string line(text.substr(0, kLongest));
-  std::ranges::replace_if(
-      line, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+  const std::string line = without_controls(text.substr(0, kLongest));
   return text.size() > kLongest ? line + "..." : line;
 }
 

@@ -4,11 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <memory>
 
 #include "base/hash.h"
+#include "base/text.h"
 #include "cache/level_file.h"
 #include "export/level_grids.h"
 #include "export/surface_writers.h"
@@ -171,8 +171,7 @@ class Exporter {
 }  // namespace
 
 Result<ExportFormat> export_format_of(const fs::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  const std::string ending = lower_case(path.extension().string());
   if (ending == ".vdb") return ExportFormat::Vdb;
   if (ending == ".obj") return ExportFormat::Obj;
   if (ending == ".ply") return ExportFormat::Ply;

@@ -2,9 +2,6 @@
 // A level on its way to a file. Internal to the room.
 #pragma once
 
-#include <algorithm>
-#include <string>
-
 #include "cache/level.h"
 #include "cache/manifest.h"
 
@@ -24,11 +21,5 @@ struct LevelOfAsset {
 
 /// "farfield 0.1.0": this one.
 inline constexpr const char* kExportGenerator = "farfield " FARFIELD_VERSION;
-
-/// Text from a file as it may stand on a line of another one.
-inline std::string on_one_line(std::string text) {
-  std::ranges::replace_if(text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
-  return text;
-}
 
 }  // namespace farfield

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/temporary_file.h"
+#include "base/text.h"
 #include "export/material_groups.h"
 #include "export/surface_writers.h"
 
@@ -114,7 +115,7 @@ Result<WrittenSurface> write_obj(const std::filesystem::path& path, const LevelO
   const MaterialGroups groups = group_materials(face_looks(level, corners), {.by_transmission = false});
   TextFile obj(path), mtl(mtl_of(path));
   const std::string head = fmt::format("# {}: level {} of {}, resolution {}\n", kExportGenerator, from.entry.level,
-                                       on_one_line(from.manifest.source), from.entry.resolution);
+                                       without_controls(from.manifest.source), from.entry.resolution);
   mtl.add("{}", head);
   for (size_t g = 0; g < groups.looks.size(); ++g) add_material(group_name(from, g), groups.looks[g], mtl);
   obj.add("{}mtllib {}\n", head, mtl_of(path).filename().string());

@@ -9,6 +9,7 @@
 
 #include "base/srgb.h"
 #include "base/temporary_file.h"
+#include "base/text.h"
 #include "cache/level_values.h"
 #include "export/face_looks.h"
 #include "export/surface_writers.h"
@@ -71,7 +72,7 @@ std::string header_of(const LevelOfAsset& from, size_t faces, const std::vector<
       "comment colours are diffuse albedos, sRGB; other properties are linear\n"
       "element vertex {}\nproperty {} x\nproperty {} y\nproperty {} z\nelement face {}\n"
       "property list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n",
-      kExportGenerator, from.entry.level, on_one_line(from.manifest.source), from.entry.resolution,
+      kExportGenerator, from.entry.level, without_controls(from.manifest.source), from.entry.resolution,
       from.level.positions.size(), number, number, number, faces);
   for (const FaceProperties& some : properties)
     for (const std::string& name : some.names) text += fmt::format("property float {}\n", name);

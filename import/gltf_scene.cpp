@@ -11,6 +11,7 @@
 
 #include "base/free_memory.h"
 #include "base/result.h"
+#include "base/text.h"
 #include "import/gltf_assemblies.h"
 #include "import/gltf_document.h"
 #include "import/gltf_nodes.h"
@@ -257,14 +258,9 @@ class SceneReader {
     if (clean.empty()) clean = if_empty;
     if (clean[0] == '.') clean[0] = '_';
     std::string unique = clean;
+    // Some file systems do not tell upper from lower case.
     for (int n = 2; !taken_names_.insert(lower_case(unique)).second; ++n) unique = fmt::format("{}_{}", clean, n);
     return unique;
-  }
-
-  /// Some file systems do not tell upper from lower case.
-  static std::string lower_case(std::string text) {
-    for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    return text;
   }
 
   void flatten_nodes(const std::vector<int>& order) {

@@ -4,11 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <set>
 #include <system_error>
 
 #include "base/hash.h"
+#include "base/text.h"
 #include "import/read_file.h"
 
 namespace farfield {
@@ -19,12 +19,6 @@ std::string with_slashes(std::string_view name) {
   std::string text(name);
   std::replace(text.begin(), text.end(), '\\', '/');
   return text;
-}
-
-std::string lower_case(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return out;
 }
 
 Result<std::vector<unsigned char>> ImageFiles::read_noted(const fs::path& path) {

@@ -42,6 +42,4 @@ std::string with_slashes(std::string_view name);
 /// name in other letters, which is the same file on Windows and Macs. Empty if nowhere.
 std::filesystem::path find_by_last_name(const std::filesystem::path& folder, const std::filesystem::path& named);
 
-std::string lower_case(std::string_view text);
-
 }  // namespace farfield

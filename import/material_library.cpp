@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/text.h"
 #include "import/derived_maps.h"
 #include "import/text_cursor.h"
 

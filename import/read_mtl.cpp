@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 
+#include "base/text.h"
 #include "import/image_files.h"
 #include "import/text_cursor.h"
 

@@ -3,11 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <cctype>
 #include <cstring>
 
 #include "base/hash.h"
 #include "base/result.h"
+#include "base/text.h"
 #include "import/gltf_parts.h"
 #include "import/read_file.h"
 #include "import/read_formats.h"
@@ -21,12 +21,8 @@ using Bytes = std::vector<unsigned char>;
 
 /// The extension in lower case, without .gz.
 std::string extension_of(fs::path path) {
-  const auto lower = [](std::string text) {
-    for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    return text;
-  };
-  if (lower(path.extension().string()) == ".gz") path.replace_extension();
-  return lower(path.extension().string());
+  if (lower_case(path.extension().string()) == ".gz") path.replace_extension();
+  return lower_case(path.extension().string());
 }
 
 bool starts_with(const Bytes& bytes, std::string_view text) {

@@ -11,6 +11,7 @@
 
 #include "base/file_io.h"
 #include "base/hash.h"
+#include "base/text.h"
 #include "import/volume_module.h"
 
 namespace farfield {
@@ -62,9 +63,7 @@ bool is_volume_file(const fs::path& path) {
   std::array<char, 8> start{};
   std::ifstream stream(path, std::ios::binary);
   if (stream.read(start.data(), start.size())) return start == kVdbMagic;
-  std::string extension = path.extension().string();
-  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
-  return extension == ".vdb";
+  return lower_case(path.extension().string()) == ".vdb";
 }
 
 Result<VolumeExtent> read_volume_extent(const fs::path& path, const FogOptions& options) {

@@ -8,11 +8,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <optional>
 
+#include "base/text.h"
 #include "farfield/export.h"
 #include "import/volume_module.h"
 #include "import/volume_write_openvdb.h"
@@ -26,15 +26,13 @@ using openvdb::CoordBBox;
 
 constexpr double kSmallNegative = 1e-3;  ///< of the largest density: what filters leave behind, not an error
 constexpr uint64_t kMostTableBricks = uint64_t{1} << 26;  ///< the table of a level takes 4 bytes for each
-constexpr uint64_t kMostVoxels = 0xfffffff0ull;           ///< of a level: payload indices have 32 bits
 constexpr std::array<const char*, 6> kEmissionNames = {"temperature", "heat", "flame", "flames", "fire", "emission"};
 constexpr std::array<const char*, 2> kAlbedoNames = {"albedo", "Cd"};
 
 std::string coordinate_text(const Coord& c) { return fmt::format("({}, {}, {})", c.x(), c.y(), c.z()); }
 
-bool is_emission(std::string name) {
-  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return std::ranges::find(kEmissionNames, name) != kEmissionNames.end();
+bool is_emission(const std::string& name) {
+  return std::ranges::find(kEmissionNames, lower_case(name)) != kEmissionNames.end();
 }
 
 /// "_level_3" of "density_level_3", a grid of several levels as OpenVDB's tools and ours name them; else nothing.
@@ -294,10 +292,10 @@ class VdbReader {
     if (smallest < 0) {
       warn("the grid \"{}\" has densities below 0, down to {}: taken as 0", grid.getName(), smallest);
     }
-    if (!(largest * options_.density_scale <= kDensest)) {
+    if (!(largest * options_.density_scale <= kDensestVolume)) {
       return error(ErrorCode::BadFile,
                    "the density {} times the scale {} is more than {}: choose another --density-scale", largest,
-                   options_.density_scale, kDensest);
+                   options_.density_scale, kDensestVolume);
     }
     return box;
   }
@@ -378,7 +376,7 @@ class VdbReader {
   }
   tl::unexpected<Error> too_large() const {
     return error(ErrorCode::Unsupported, "it has more than {} million voxels; split it into several files",
-                 kMostVoxels / 1000000);
+                 kMostVolumeVoxels / 1000000);
   }
 
   Result<void> count_voxels(const std::string& name) {
@@ -394,7 +392,7 @@ class VdbReader {
       ++volume_.filled_bricks;
       volume_.active_voxels += active[index];
     }
-    if (volume_.active_voxels > kMostVoxels) return too_large();
+    if (volume_.active_voxels > kMostVolumeVoxels) return too_large();
     if (volume_.active_voxels == 0) return nothing_in(name);  // all were so thin that the scale left nothing
     return {};
   }
@@ -491,8 +489,6 @@ class VdbReader {
     if (!emission.empty()) warn("emission is not modelled yet; ignored: {}", emission);
     if (!others.empty()) warn("grids that are ignored: {}", others);
   }
-
-  static constexpr double kDensest = 1e30;  ///< times lengths and squares stay floats
 
   const std::string& path_;
   const FogOptions& options_;

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "path_tracer/camera.h"
 
-#include <algorithm>
-
 #include "base/check.h"
+#include "base/key_place.h"
 
 namespace farfield {
 
@@ -45,9 +44,8 @@ CameraRay Camera::ray(float x_px, float y_px) const {
 
 CameraRay ray_at(std::span<const Camera> keys, float x_px, float y_px, float time) {
   if (keys.size() == 1) return keys.front().ray(x_px, y_px);
-  const float place = time * static_cast<float>(keys.size() - 1);
-  const size_t key = std::min(static_cast<size_t>(place), keys.size() - 2);
-  const float t = place - static_cast<float>(key);
+  const auto [key, place] = find_key_place(keys.size(), time);
+  const auto t = static_cast<float>(place);
   const CameraRay a = keys[key].ray(x_px, y_px), b = keys[key + 1].ray(x_px, y_px);
   return {glm::mix(a.origin, b.origin, t), glm::normalize(glm::mix(a.direction, b.direction, t)),
           glm::mix(a.cone_width, b.cone_width, t), glm::mix(a.cone_spread, b.cone_spread, t)};

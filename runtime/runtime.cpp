@@ -42,8 +42,9 @@ mat4x3 with_origin(const mat4x3& m, const dvec3& origin, const glm::dmat3& rotat
   return result;
 }
 
-uint64_t bytes_per_instance(const RuntimeOptions& options) {
-  return sizeof(InstanceRecord) + options.scene_bytes_per_instance;
+uint64_t bytes_per_instance(const RuntimeOptions& options, bool does_any_move = false) {
+  const uint32_t in_scene = options.scene_bytes_per_instance;
+  return sizeof(InstanceRecord) + (does_any_move ? std::max(in_scene, kMovingSceneBytesPerInstance) : in_scene);
 }
 
 tl::unexpected<Error> no_such_instance(InstanceId instance) {
@@ -83,11 +84,8 @@ struct Runtime::Impl {
   /// Tells the budget what so many instances take, of which the first `with_data` have data of the host's. The room
   /// that the arrays have beyond was never touched: it is not resident.
   Result<void> count_instances(size_t count, size_t with_data) {
-    const uint64_t scene_bytes = geometry.motion_bytes() == 0
-                                     ? options.scene_bytes_per_instance
-                                     : std::max(options.scene_bytes_per_instance, kMovingSceneBytesPerInstance);
-    return levels.set_instance_bytes(count * (sizeof(InstanceRecord) + scene_bytes) + geometry.motion_bytes() +
-                                     with_data * sizeof(InstanceData));
+    return levels.set_instance_bytes(count * bytes_per_instance(options, geometry.motion_bytes() > 0) +
+                                     geometry.motion_bytes() + with_data * sizeof(InstanceData));
   }
   Result<void> count_instances() { return count_instances(geometry.instances.size(), instance_data.size()); }
   bool has_instance(InstanceId instance) const {

@@ -12,6 +12,7 @@
 
 #include "base/file_io.h"
 #include "base/result.h"
+#include "base/text.h"
 
 namespace farfield::tool {
 namespace fs = std::filesystem;
@@ -29,11 +30,10 @@ std::string one_line(std::string_view text) {
   while (!text.empty() && text.back() == '\n') text.remove_suffix(1);
   std::string line;
   for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
     if (c == '\n')
       line += "; ";
     else
-      line += byte < 0x20 || byte == 0x7f ? '?' : c;
+      line += is_control(c) ? '?' : c;
   }
   return line;
 }

@@ -41,9 +41,7 @@ void add_render_command(CLI::App& app, Action& action) {
       app.add_subcommand("render", "Render one frame of a glTF scene; bakes its meshes first if need be");
   add_picture_flags(command, *arguments, "EXR file to write; a PNG preview goes beside it");
   add_level_flags(command, arguments->options);
-  command->add_option("--frame", arguments->frame, "Frame n is the scene at n / fps seconds, see --fps")
-      ->check(CLI::Range(0, 1 << 24))
-      ->capture_default_str();
+  add_frame_flag(command, arguments->frame);
   add_stats_flag(command, *arguments);
   command->footer(
       "Example:\n  farfield render forest.glb --frame 60 --size 960x540 --spp 64 --budget 2G -o forest.exr");

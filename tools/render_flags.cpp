@@ -114,6 +114,12 @@ void add_level_flags(CLI::App* command, RenderOptions& options) {
       ->default_str(fmt::format("{}", options.rays_per_voxel));
 }
 
+void add_frame_flag(CLI::App* command, int& frame) {
+  command->add_option("--frame", frame, "Frame n is the scene at n / fps seconds, see --fps")
+      ->check(CLI::Range(0, 1 << 24))
+      ->capture_default_str();
+}
+
 void add_stats_flag(CLI::App* command, RenderArguments& arguments) {
   command->add_flag("--stats", arguments.with_stats,
                     "Print at the end what each level of each asset did: loads, bytes, hits, how often it was missing");

@@ -27,6 +27,8 @@ void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std:
 /// Adds how coarse levels are, by budget, pixel error and bake, where the sun stands, and what else is written.
 void add_level_flags(CLI::App* command, RenderOptions& options);
 
+/// Adds --frame of commands about one frame.
+void add_frame_flag(CLI::App* command, int& frame);
 /// Adds --stats of commands that render.
 void add_stats_flag(CLI::App* command, RenderArguments& arguments);
 

@@ -39,9 +39,7 @@ void add_why_command(CLI::App& app, Action& action) {
       "why", "Explain a pixel of a frame: which instances and levels it shows, and why nothing finer");
   add_picture_flags(command, *arguments, "");
   add_level_flags(command, arguments->options);
-  command->add_option("--frame", arguments->frame, "Frame n is the scene at n / fps seconds, see --fps")
-      ->check(CLI::Range(0, 1 << 24))
-      ->capture_default_str();
+  add_frame_flag(command, arguments->frame);
   add_parsed_option(command, "--pixel", arguments->pixel, parse_pixel_place,
                     "X,Y from the picture's upper left corner, which is 0,0")
       ->required();
