@@ -198,9 +198,6 @@ float distance(const SymMat3& a, const SymMat3& b) {
                    std::abs(a.xz - b.xz), std::abs(a.yz - b.yz)});
 }
 
-/// What light sees of a face's normals.
-const SymMat3& seen_normals(const FaceMaterial& m) { return m.shading_sggx.trace() > 0 ? m.shading_sggx : m.sggx; }
-
 /// Whether all faces have the one normal that their triangle has. The tolerance is a spread of normals of half a degree
 /// (alpha = 0.01), far below what roughness in images can tell.
 bool has_flat_normals(const Surface& surface) {
@@ -210,7 +207,7 @@ bool has_flat_normals(const Surface& surface) {
     const dvec3 a(surface.positions[t.x]);
     const dvec3 normal = glm::cross(dvec3(surface.positions[t.y]) - a, dvec3(surface.positions[t.z]) - a);
     const double length = glm::length(normal);
-    const SymMat3& s = seen_normals(surface.materials[i]);
+    const SymMat3& s = surface.materials[i].seen_normals();
     if (!(length > 0) || !(s.trace() > 0)) continue;  // no area, nothing to see
     if (distance(SymMat3::outer(vec3(normal / length)), s * (1 / s.trace())) > kTolerance) return false;
   }
@@ -235,7 +232,7 @@ void pack_surface(const Surface& surface, const SurfaceOrder& order, LevelData& 
   const auto& materials = surface.materials;
   if (!has_flat_normals(surface)) {
     level.face_sggx =
-        pack_each<PackedSurfaceSggx>(materials, [](const auto& m) { return pack_surface_sggx(seen_normals(m)); });
+        pack_each<PackedSurfaceSggx>(materials, [](const auto& m) { return pack_surface_sggx(m.seen_normals()); });
   }
   level.face_diffuse = pack_colors(materials, [](const auto& m) { return m.diffuse; });
   level.face_specular = pack_colors(materials, [](const auto& m) { return m.specular; });

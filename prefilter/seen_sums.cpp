@@ -20,7 +20,7 @@ double mean_sigma(const SymMat3& s) { return mean_opacity(s, 1e-9, 1) / 1e-9; }
 
 void SeenSums::add_hit(const FaceMaterial& m) {
   hits_.add(1);
-  const auto sggx = entries_of(m.sggx);
+  const auto sggx = entries_of(m.flake_normals());
   for (size_t i = 0; i < sggx.size(); ++i) sggx_[i].add(static_cast<double>(sggx[i]));
   add(diffuse_, m.diffuse);
   add(specular_, m.specular);

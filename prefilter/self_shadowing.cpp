@@ -8,15 +8,13 @@
 #include <optional>
 #include <vector>
 
+#include "prefilter/sent_light.h"
 #include "prefilter/voxel_ratios.h"
 #include "scattering/albedo.h"
 #include "scattering/highlight.h"
 #include "scattering/highlight_lean.h"
 #include "scattering/hot_spot.h"
-#include "scattering/microfacet.h"
 #include "scattering/open_side.h"
-#include "scattering/sggx.h"
-#include "scattering/warp.h"
 
 namespace farfield {
 namespace {
@@ -24,83 +22,10 @@ namespace {
 /// In voxels: light that goes on starts this far from the face it leaves.
 constexpr float kClearance = 1e-3f;
 constexpr float kFar = std::numeric_limits<float>::infinity();
-/// What the measurement of a brick counts in each of its voxels, as light of weight 1 that is sent on.
+/// What the measurement of a brick counts in each of its voxels, in hits or in light of weight 1 that is sent on.
 constexpr double kPriorLight = 64;
 /// Sides of which light shows no spread along an axis say nothing about it: a share of their spread in all.
 constexpr double kLeastSpread = 1e-2;
-
-/// Light that goes on from what a line sees first.
-struct SentOn {
-  vec3 direction{0.0f};
-  float weight = 0;  ///< how much light
-  enum class Kind { Highlight, Reflected, Through } kind = Kind::Highlight;
-  float contrast = 0;  ///< of reflected light, how much it is on the viewer's side: L less its mean; the phase's cosine
-  float slope = 0;     ///< what the hot spot's strength, or the highlight's lean, multiplies, to first order
-  vec3 side{0.0f};     ///< the normal on the line's side; 0 of the highlight
-  vec3 opening{0.0f};  ///< what the open side multiplies: scattering/open_side.h, to first order
-};
-
-/// Of the highlight of a flat piece with normal `seen`.
-vec3 mirrored(float roughness2, const vec3& seen, const vec3& wo, float u1, float u2) {
-  const vec3 facet = Microfacets(specular_sggx(SymMat3::outer(seen), roughness2), seen).sample_visible(wo, u1, u2);
-  const vec3 away = reflect_about(wo, facet);
-  return glm::dot(away, seen) > 0 ? away : cosine_lobe(seen, u1, u2);  // over several facets
-}
-
-/// Of the base: a cosine lobe on the side that the light came from or, as often as light goes through, on the other.
-template <typename Material>
-SentOn scattered_by_base(const Material& m, const vec3& seen, const vec3& direction, SplitMix& random) {
-  const float through = component_sum(m.transmission), back = component_sum(m.diffuse);
-  const bool is_through = static_cast<float>(random.next_unit()) * (through + back) < through;
-  const auto u1 = to_unit_float(random.next()), u2 = to_unit_float(random.next());
-  SentOn sent{.direction = cosine_lobe(is_through ? -seen : seen, u1, u2), .side = seen};
-  sent.kind = is_through ? SentOn::Kind::Through : SentOn::Kind::Reflected;
-  if (!is_through) {
-    sent.contrast =
-        hot_spot_lobe(-glm::dot(direction, sent.direction)) - mean_hot_spot_lobe(-glm::dot(direction, seen));
-    sent.slope = sent.contrast;
-  }
-  sent.opening = (1 - std::min((through + back) / 3, 1.0f)) * seen;
-  return sent;
-}
-
-/// Where light goes on that arrived along `direction`. Material: FaceMaterial or Voxel. Nothing for black ones.
-template <typename Material>
-std::optional<SentOn> scattered(const Material& m, const vec3& normal, const vec3& direction, SplitMix& random) {
-  const vec3 seen = glm::dot(normal, direction) > 0 ? -normal : normal;
-  vec3 mirror(0.0f);
-  if (const Highlight highlight(m.specular, m.roughness2); highlight.exists())
-    mirror = highlight.albedo(highlight.share(-glm::dot(seen, direction)));
-  const float of_mirror = component_sum(mirror);
-  const float of_base = component_sum((vec3(1.0f) - mirror) * (m.diffuse + m.transmission));
-  if (!(of_mirror + of_base > 0)) return {};
-  SentOn sent;
-  if (static_cast<float>(random.next_unit()) * (of_mirror + of_base) < of_mirror) {
-    const auto u1 = to_unit_float(random.next()), u2 = to_unit_float(random.next());
-    sent.direction = mirrored(m.roughness2, seen, -direction, u1, u2);
-    sent.contrast = -glm::dot(direction, sent.direction);
-    sent.slope = sent.contrast * (1 - std::min((of_mirror + of_base) / 3, 1.0f));
-  } else {
-    sent = scattered_by_base(m, seen, direction, random);
-  }
-  sent.weight = of_mirror + of_base;
-  return sent;
-}
-
-/// From the hit. Nothing for faces too small to have a normal.
-std::optional<SentOn> scattered_by_source(const LineScene& scene, const SeenLine& line, SplitMix& random) {
-  const float longest = max_component(glm::abs(line.hit->normal));
-  if (!(longest >= std::numeric_limits<float>::min())) return {};
-  // In two steps: the square of a tiny face's normal may be no float.
-  const vec3 normal = glm::normalize(line.hit->normal / longest);
-  return scattered(scene.geometry().materials[line.hit->triangle], normal, line.direction, random);
-}
-
-std::optional<SentOn> scattered_by_medium(const Voxel& voxel, const SeenLine& line, SplitMix& random) {
-  const auto u1 = to_unit_float(random.next()), u2 = to_unit_float(random.next());
-  const vec3 normal = Sggx(cholesky(voxel.sggx)).sample_visible(-line.direction, u1, u2);
-  return scattered(voxel, normal, line.direction, random);
-}
 
 /// Where the medium stops a line first.
 struct Collision {
@@ -119,13 +44,15 @@ std::optional<Collision> first_collision(const SparseVolume& volume, const LineS
   return found;
 }
 
-/// How much of the light that something sends on gets away.
+/// How much light gets away from what is seen of something.
 struct Escape {
-  FixedSum sent, away;
+  FixedSum hits, away;
   FixedSum sent_back, away_back;         ///< of it, what the base reflects
   FixedSum sent_through, away_through;   ///< and what it lets through
+  FixedSum away_highlight;               ///< of it, what the highlight reflects
   FixedSum away_spot;                    ///< what the hot spot's strength multiplies
   FixedSum away_lean;                    ///< what the highlight's lean multiplies
+  std::array<FixedSum, 3> away_color;    ///< of the base, by channel
   std::array<FixedSum, 3> away_opening;  ///< what the open side multiplies
 };
 
@@ -181,16 +108,17 @@ struct Light {
   void add(uint32_t voxel, const SentOn& sent, double share_away) {
     const double away = share_away * sent.weight;
     Escape& escape = of_voxel[voxel];
-    escape.sent.add(sent.weight);
     escape.away.add(away);
+    for (int c = 0; c < 3; ++c) escape.away_color[static_cast<size_t>(c)].add(share_away * sent.color[c]);
     for (int i = 0; i < 3; ++i) escape.away_opening[static_cast<size_t>(i)].add(away * sent.opening[i]);
+    all_away.add(away);
+    sides.add(away, sent);
     if (sent.kind == SentOn::Kind::Highlight) {
       highlight.add(away, sent);
+      escape.away_highlight.add(away);
       escape.away_lean.add(away * sent.slope);
       return;
     }
-    away_of_base.add(away);
-    sides.add(away, sent);
     if (sent.kind == SentOn::Kind::Through) {
       escape.sent_through.add(sent.weight);
       escape.away_through.add(away);
@@ -203,7 +131,7 @@ struct Light {
   }
 
   std::vector<Escape> of_voxel;
-  FixedSum away_of_base;
+  FixedSum all_away;
   Contrast back, highlight;
   Sides sides;
 };
@@ -223,7 +151,9 @@ class EscapeMeasurement {
     return fitted_contrast(source_.highlight, medium_.highlight, -kMostHighlightLean, kMostHighlightLean);
   }
   vec3 open_side() const;
-  std::vector<double> ratios() const;
+  double highlight_ratio() const;
+  std::vector<double> ratios(double highlight_ratio) const;
+  vec3 color_ratio(const std::vector<double>& ratios) const;
   std::vector<double> ratios_through() const;
 
  private:
@@ -233,13 +163,13 @@ class EscapeMeasurement {
   bool meets_macrosurface(const vec3& from, const SentOn& sent, SplitMix& random) const {
     return scene_.is_stopped_by_macrosurface(from, sent.direction, near(), kFar, random);
   }
-  /// Of each voxel's light, away / sent, both of an Escape.
-  template <typename Away, typename Sent>
-  std::vector<double> shares(const Light& light, const Away& away, const Sent& sent) const {
+  /// Of each voxel's light, away / all, both of an Escape.
+  template <typename Away, typename All>
+  std::vector<double> shares(const Light& light, const Away& away, const All& all) const {
     std::vector<SourceAndMedium> sums(light.of_voxel.size());
     for (size_t v = 0; v < sums.size(); ++v) {
       sums[v].source.add(away(light.of_voxel[v]));
-      sums[v].medium.add(sent(light.of_voxel[v]));
+      sums[v].medium.add(all(light.of_voxel[v]));
     }
     return shrunk_ratios(volume_, sums, kPriorLight);
   }
@@ -253,8 +183,11 @@ class EscapeMeasurement {
 void EscapeMeasurement::add_source(const SeenLine& line, SplitMix& random) {
   const auto voxel = scene_.voxel_of_hit(line);
   const auto sent = scattered_by_source(scene_, line, random);
-  if (!voxel || !sent || meets_macrosurface(line.point(), *sent, random)) return;
-  const bool is_stopped = scene_.is_stopped_by_geometry(line.point(), sent->direction, near(), kFar, random);
+  if (!voxel || (sent && meets_macrosurface(line.point(), *sent, random))) return;
+  source_.of_voxel[*voxel].hits.add(1);
+  if (!sent) return;
+  const bool is_stopped =
+      sent->is_lost || scene_.is_stopped_by_geometry(line.point(), sent->direction, near(), kFar, random);
   source_.add(*voxel, *sent, is_stopped ? 0 : 1);
 }
 
@@ -264,14 +197,16 @@ void EscapeMeasurement::add_medium(const SeenLine& line, SplitMix& random) {
   const auto sent = scattered_by_medium(volume_.voxels[collision->voxel], line, random);
   const dvec3 at = line.ray.origin + collision->at * line.ray.direction;
   const vec3 from(volume_.lattice.origin + volume_.lattice.voxel_size * at);
-  if (!sent || meets_macrosurface(from, *sent, random)) return;
+  if (sent && meets_macrosurface(from, *sent, random)) return;
+  medium_.of_voxel[collision->voxel].hits.add(1);
+  if (!sent) return;
   const VoxelRay away{at, dvec3(sent->direction), 0, kFar};
   medium_.add(collision->voxel, *sent, std::exp(-optical_depth(volume_, scene_.grid(), away)));
 }
 
 /// The mean side of the light that gets away must be the geometry's.
 vec3 EscapeMeasurement::open_side() const {
-  const double source = source_.away_of_base.value(), medium = medium_.away_of_base.value();
+  const double source = source_.all_away.value(), medium = medium_.all_away.value();
   if (!(source > 0 && medium > 0)) return vec3(0.0f);
   const dvec3 wanted = vector_of(source_.sides.side) / source, is = vector_of(medium_.sides.side) / medium;
   const dvec3 opening = vector_of(medium_.sides.opening) / medium;
@@ -286,17 +221,50 @@ vec3 EscapeMeasurement::open_side() const {
   return vec3(length > kMostOpenSide ? x * (kMostOpenSide / length) : x);
 }
 
-/// What gets away of the geometry's light by what gets away of the medium's, as the volume has it by now, voxel by
-/// voxel.
-std::vector<double> EscapeMeasurement::ratios() const {
+/// How much more of the highlight gets away than of the rest, in the geometry by what it does in the medium. Of the
+/// level as a whole: single voxels have too few highlights.
+double EscapeMeasurement::highlight_ratio() const {
+  const auto odds = [&](const Light& light, float lean) {
+    double highlight = 0, rest = 0;
+    for (const Escape& escape : light.of_voxel) {
+      highlight += escape.away_highlight.value() + double{lean} * escape.away_lean.value();
+      rest += escape.away.value() - escape.away_highlight.value();
+    }
+    return highlight > 0 && rest > 0 ? highlight / rest : 0.0;
+  };
+  const double source = odds(source_, 0), medium = odds(medium_, volume_.highlight_lean);
+  return source > 0 && medium > 0 ? source / medium : 1.0;
+}
+
+/// The light that gets away from a hit on the geometry by that from a hit on the medium, as the volume has it by now
+/// but for the highlight's ratio, voxel by voxel.
+std::vector<double> EscapeMeasurement::ratios(double highlight_ratio) const {
   const auto medium_away = [&](const Escape& escape) {
-    return escape.away.value() + double{volume_.hot_spot} * escape.away_spot.value() +
-           double{volume_.highlight_lean} * escape.away_lean.value() +
+    const double highlight = escape.away_highlight.value() + double{volume_.highlight_lean} * escape.away_lean.value();
+    return escape.away.value() - escape.away_highlight.value() + highlight_ratio * highlight +
+           double{volume_.hot_spot} * escape.away_spot.value() +
            glm::dot(dvec3(volume_.open_side), vector_of(escape.away_opening));
   };
   const auto source_away = [](const Escape& escape) { return escape.away.value(); };
-  const auto sent = [](const Escape& escape) { return escape.sent.value(); };
-  return divided(shares(source_, source_away, sent), shares(medium_, medium_away, sent));
+  const auto hits = [](const Escape& escape) { return escape.hits.value(); };
+  return divided(shares(source_, source_away, hits), shares(medium_, medium_away, hits));
+}
+
+/// How much more of each channel gets away from the base than of all of it, in the geometry by what it does in the
+/// medium with these ratios: what is seen and what is lit as well have not quite one colour. Of the level as a whole.
+vec3 EscapeMeasurement::color_ratio(const std::vector<double>& ratios) const {
+  dvec3 source(0.0), medium(0.0);
+  for (size_t v = 0; v < ratios.size(); ++v) {
+    source += vector_of(source_.of_voxel[v].away_color);
+    medium += std::clamp(ratios[v], kLeastEscape, kMostEscape) * vector_of(medium_.of_voxel[v].away_color);
+  }
+  const double all_source = source.x + source.y + source.z, all_medium = medium.x + medium.y + medium.z;
+  vec3 ratio(1.0f);
+  for (int c = 0; c < 3; ++c) {
+    if (!(source[c] > 0 && medium[c] > 0)) continue;
+    ratio[c] = static_cast<float>(std::clamp(source[c] / medium[c] * (all_medium / all_source), 0.5, 2.0));
+  }
+  return ratio;
 }
 
 /// How much more of the light gets away that flakes let through than of what they reflect, in the geometry by what it
@@ -319,11 +287,36 @@ void let_through(double ratio, Voxel& voxel) {
   voxel.diffuse = glm::max(base - voxel.transmission, vec3(0.0f));
 }
 
+void recolor(const vec3& ratio, Voxel& voxel) {
+  const vec3 base = voxel.diffuse + voxel.transmission;
+  for (int c = 0; c < 3; ++c) {
+    const float gain = odds_gain(vec3(std::min(base[c], 1.0f)), ratio[c]).x;
+    voxel.diffuse[c] *= gain, voxel.transmission[c] *= gain;
+  }
+}
+
+void let_glance(double ratio, Voxel& voxel) {
+  const auto odds = static_cast<float>(std::clamp(ratio, kLeastGlance, kMostGlance));
+  const vec3 own = voxel.specular;
+  const auto mean = [&](const vec3& f0) { return Highlight(f0, voxel.roughness2).mean_albedo(); };
+  const vec3 wanted = cluster_albedo(mean(own), odds);
+  vec3 low(0.0f), high(1.0f);
+  constexpr int kSteps = 12;  // far finer than the file's 8 bits
+  for (int i = 0; i < kSteps; ++i) {
+    const vec3 middle = 0.5f * (low + high), is = mean(middle);
+    for (int c = 0; c < 3; ++c) (is[c] < wanted[c] ? low : high)[c] = middle[c];
+  }
+  for (int c = 0; c < 3; ++c) {
+    if (own[c] > 0) voxel.specular[c] = 0.5f * (low[c] + high[c]);
+  }
+}
+
 void let_escape(double ratio, Voxel& voxel) {
+  const vec3 albedo = layered_albedo(voxel.specular, voxel.diffuse + voxel.transmission);
+  if (!(max_component(albedo) > 0)) return;  // rays say nothing of what sends nothing
   const auto share = static_cast<float>(std::clamp(ratio, kLeastEscape, kMostEscape));
   voxel.self_shadowing = std::min(share, 1.0f);
   if (!(share > 1)) return;
-  const vec3 albedo = layered_albedo(voxel.specular, voxel.diffuse + voxel.transmission);
   const vec3 gain = cluster_albedo(glm::min(albedo, vec3(1.0f)), share) / glm::max(albedo, vec3(1e-6f));
   voxel.diffuse *= gain;
   voxel.specular *= gain;
@@ -338,9 +331,13 @@ Result<void> measure_self_shadowing(const LineScene& scene, SparseVolume& volume
   volume.hot_spot = measurement.hot_spot();
   volume.highlight_lean = measurement.highlight_lean();
   volume.open_side = measurement.open_side();
-  const std::vector<double> through = measurement.ratios_through(), ratios = measurement.ratios();
+  const double highlight = std::clamp(measurement.highlight_ratio(), kLeastGlance, kMostGlance);
+  const std::vector<double> through = measurement.ratios_through(), ratios = measurement.ratios(highlight);
+  const vec3 color = measurement.color_ratio(ratios);
   for (size_t v = 0; v < ratios.size(); ++v) {
+    recolor(color, volume.voxels[v]);
     let_through(through[v], volume.voxels[v]);
+    let_glance(highlight, volume.voxels[v]);
     let_escape(ratios[v], volume.voxels[v]);
   }
   return {};

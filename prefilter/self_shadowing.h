@@ -27,15 +27,25 @@ inline constexpr double kLeastThrough = 0.25, kMostThrough = 4;
 /// Multiplies the odds of light to go through the voxel's flakes instead of back; they absorb as much as before.
 void let_through(double ratio, Voxel& voxel);
 
+/// Multiplies the odds of light of each channel to be reflected or let through by the voxel's base. ratio > 0.
+void recolor(const vec3& ratio, Voxel& voxel);
+
+/// Bounds of how much more of its highlights a geometry lets away, by what its medium does.
+inline constexpr double kLeastGlance = 0.5, kMostGlance = 2;
+
+/// Multiplies the odds of light to be reflected by the voxel's highlight, in the mean over all directions, by a
+/// brighter or darker F0.
+void let_glance(double ratio, Voxel& voxel);
+
 struct SelfShadowingOptions {
   double lines = 0;
   uint64_t seed = 0;
   Job job{};  ///< reports from the calling thread alone
 };
 
-/// Sets self_shadowing, the hot spot and the open side and raises albedos, for the densities that the volume has. Light
-/// goes on from what isotropic lines see first, in the geometry and in the medium, until it is out of both. The result
-/// does not depend on the number of threads. Errors: Cancelled.
+/// Sets self_shadowing, the hot spot, the highlight's lean and the open side and corrects albedos, for the densities
+/// that the volume has. Light goes on from what isotropic lines see first, in the geometry and in the medium, until it
+/// is out of both. The result does not depend on the number of threads. Errors: Cancelled.
 Result<void> measure_self_shadowing(const LineScene& scene, SparseVolume& volume, const SelfShadowingOptions& options);
 
 }  // namespace farfield

@@ -24,6 +24,11 @@ struct FaceMaterial {
   vec3 emission{0.0f};      ///< linear radiance of both sides, >= 0, may exceed 1
   float gap = 0.0f;         ///< share of paths that pass between the pieces that the face stands for
 
+  /// What light sees of the face's normals.
+  const SymMat3& seen_normals() const { return shading_sggx.trace() > 0 ? shading_sggx : sggx; }
+  /// The normals of the flakes that stand for the face. They make both the look of a volume and its attenuation along
+  /// each direction: so they are those that light sees, but bent away from the face's own by no more than 30 degrees.
+  SymMat3 flake_normals() const;
   /// The share of rays that the face stops.
   float stopped_share() const { return opacity * (1 - gap); }
 };

@@ -38,7 +38,7 @@ struct HitSums {
 
   void add(const FaceMaterial& m) {
     ++hits;
-    sggx += m.sggx;
+    sggx += m.flake_normals();
     diffuse += m.diffuse;
     specular += m.specular;
     transmission += m.transmission;

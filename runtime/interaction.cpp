@@ -17,6 +17,7 @@
 #include "runtime/interaction_model.h"
 #include "scattering/albedo.h"
 #include "scattering/material_model.h"
+#include "scattering/visible_normal.h"
 
 namespace farfield {
 
@@ -90,14 +91,6 @@ void set_reflectance(Reflectance& reflectance, const Params& params) {
   reflectance.specular = params.specular;
   reflectance.transmission = params.transmission;
   reflectance.roughness = std::sqrt(std::sqrt(params.roughness2));
-}
-
-/// On wo's side of the surface, and not beyond its own horizon.
-vec3 visible_normal(vec3 normal, const vec3& geometric_normal, const vec3& wo) {
-  constexpr float kLeastCosine = 0.02f;
-  if (glm::dot(normal, geometric_normal) < 0.0f) normal = -normal;
-  const float cosine = glm::dot(normal, wo);
-  return cosine >= kLeastCosine ? normal : glm::normalize(normal + (kLeastCosine - cosine) * wo);
 }
 
 /// Turned with the flakes, and as long as it was.

@@ -63,7 +63,6 @@ class FlakeModel {
   static constexpr bool kHasDiffuse = (kChannels & kDiffuse) != 0;
   static constexpr bool kHasSpecular = (kChannels & kSpecular) != 0;
   static constexpr bool kHasTransmission = (kChannels & kTransmission) != 0;
-  static constexpr bool kHasBase = kHasDiffuse || kHasTransmission;
   static constexpr bool kHasMultiple = (kChannels & kSelfShadowing) != 0;
 
   /// What only specular flakes need.
@@ -95,7 +94,7 @@ class FlakeModel {
   float multiple_density(const vec3& wi) const requires((kChannels & kSelfShadowing) != 0);
   bool scatters_once() const { return chances_.specular + chances_.diffuse + chances_.transmission > 0; }
   Flake sample_flake(Rng& rng) const;
-  void open(const vec3& normal, SurfaceParams& params) const requires((kChannels & (kDiffuse | kTransmission)) != 0);
+  void open(const vec3& normal, SurfaceParams& params) const;
 
   CholeskyFactor<float> flakes_;
   vec3 wo_;

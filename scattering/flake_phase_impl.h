@@ -120,17 +120,15 @@ typename FlakeModel<kChannels>::Flake FlakeModel<kChannels>::sample_flake(Rng& r
     params.specular = specular_.f0, params.roughness2 = specular_.roughness2;
     params.highlight_lean = specular_.lean;
   }
-  if constexpr (kHasBase) {
-    if (open_side_ != vec3(0.0f)) open(m, params);
-  }
+  if (open_side_ != vec3(0.0f)) open(m, params);
   params.hot_spot = hot_spot_;
   return Flake(params, m, wo_);
 }
 
 template <unsigned kChannels>
-void FlakeModel<kChannels>::open(const vec3& normal, SurfaceParams& params) const
-    requires((kChannels & (kDiffuse | kTransmission)) != 0) {
-  const vec3 gain = open_side_gain(open_side_, normal, params.diffuse + params.transmission);
+void FlakeModel<kChannels>::open(const vec3& normal, SurfaceParams& params) const {
+  params.highlight_opening = side_opening(open_side_, normal);
+  const vec3 gain = odds_gain(params.diffuse + params.transmission, params.highlight_opening);
   params.diffuse *= gain, params.transmission *= gain;
 }
 

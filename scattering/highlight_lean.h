@@ -9,17 +9,13 @@
 // and white stays white. Reciprocal as far as that albedo is the same from both sides.
 #pragma once
 
-#include "base/vec.h"
-#include "scattering/albedo.h"
-
 namespace farfield {
 
 /// The most that a highlight leans, to the viewer's side or (negative) away from it.
 inline constexpr float kMostHighlightLean = 0.7f;
 
-/// What the highlight is multiplied by. albedo: of the flake as a whole, in [0, 1].
-inline vec3 highlight_lean_gain(float lean, float phase_cosine, const vec3& albedo) {
-  return odds_gain(albedo, 1.0f + lean * phase_cosine);
-}
+/// How much more of the highlight gets away at this phase angle: what odds of albedos are multiplied by (odds_gain() in
+/// scattering/albedo.h).
+inline float highlight_leaning(float lean, float phase_cosine) { return 1.0f + lean * phase_cosine; }
 
 }  // namespace farfield

@@ -5,21 +5,20 @@
 //
 //   1 + open_side.m
 //
-// times as much of its light away as the flake does on the mean of its sides (docs/decisions/0019). What stays meets
-// the same leaf again: so it is the odds of its albedo that are multiplied, and white stays white.
+// times as much of its light away, of the base and of the highlight, as the flake does on the mean of its sides
+// (docs/decisions/0019, 0031). What stays meets the same leaf again: so it is the odds of albedos that are multiplied,
+// and white stays white.
 #pragma once
 
 #include "base/vec.h"
-#include "scattering/albedo.h"
 
 namespace farfield {
 
 /// The longest open_side: more is no leaf, but noise.
 inline constexpr float kMostOpenSide = 0.5f;
 
-/// What the diffuse reflectance and transmission of a side (their sum `base`, in [0, 1]) are multiplied by.
-inline vec3 open_side_gain(const vec3& open_side, const vec3& normal, const vec3& base) {
-  return odds_gain(base, 1.0f + glm::dot(open_side, normal));
-}
+/// How much more of its light a side with this unit normal lets away: what odds of albedos are multiplied by
+/// (odds_gain() in scattering/albedo.h), of the base and of the highlight.
+inline float side_opening(const vec3& open_side, const vec3& normal) { return 1.0f + glm::dot(open_side, normal); }
 
 }  // namespace farfield

@@ -28,6 +28,7 @@ struct SurfaceParams {
   float roughness2 = 1.0f;      ///< alpha^2
   float hot_spot = 0.0f;        ///< of the diffuse part, in [0, kStrongestHotSpot]: for flakes (scattering/hot_spot.h)
   float highlight_lean = 0.0f;  ///< at most kMostHighlightLean: for flakes (scattering/highlight_lean.h)
+  float highlight_opening = 1.0f;  ///< in [1 - kMostOpenSide, 1 + kMostOpenSide]: for flakes (scattering/open_side.h)
 };
 
 /// A face seen from wo, with the given channels (scattering/channels.h); parameters of the others are not looked at.
@@ -55,8 +56,8 @@ class SurfaceModel {
     Highlight highlight;
     Microfacets facets;   ///< valid if the highlight exists
     vec3 multiple{0.0f};  ///< times (1 - E(wi)) / pi: what facets reflect onto each other
-    vec3 albedo{0.0f};    ///< of the whole surface; set if the highlight leans
-    float lean = 0;
+    vec3 albedo{0.0f};    ///< of the whole surface; set if not all of the highlight gets away alike
+    float lean = 0, opening = 1;
   };
 
   void couple_to_highlight(const SurfaceParams& params) requires((kChannels & kSpecular) != 0);

@@ -38,12 +38,12 @@ void SurfaceModel<kChannels>::couple_to_highlight(const SurfaceParams& params) r
                highlight.multiple_lobe() * (1 - share.all)};
 
   const vec3 returned = highlight.albedo(share), once = highlight.once(share);
-  if (params.highlight_lean != 0) {
+  if (params.highlight_lean != 0 || params.highlight_opening != 1) {
     vec3 base(0.0f);
     if constexpr (kHasDiffuse) base += diffuse_;
     if constexpr (kHasTransmission) base += transmission_;
     specular_.albedo = layered_albedo(returned, base);
-    specular_.lean = params.highlight_lean;
+    specular_.lean = params.highlight_lean, specular_.opening = params.highlight_opening;
   }
   const float left = 1 - min_component(returned);
   specular_chance_ = max_component(once);
@@ -74,7 +74,9 @@ vec3 SurfaceModel<kChannels>::eval(const vec3& wi) const {
         base += specular_.multiple * (1 - share.all);
         highlight = eval_specular_facets<Masking::HeightCorrelated>(
             specular_.facets, wo_, cos_o_, wi, cos_i, [this](float cos) { return specular_.highlight.fresnel(cos); });
-        if (specular_.lean != 0) highlight *= highlight_lean_gain(specular_.lean, glm::dot(wo_, wi), specular_.albedo);
+        if (specular_.lean != 0 || specular_.opening != 1)
+          highlight *=
+              odds_gain(specular_.albedo, specular_.opening * highlight_leaning(specular_.lean, glm::dot(wo_, wi)));
       }
     }
   }

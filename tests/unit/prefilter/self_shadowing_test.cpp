@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "prefilter/measure_volume.h"
+#include "scattering/highlight.h"
 #include "scattering/highlight_lean.h"
 #include "scattering/hot_spot.h"
 #include "tests/support/surfaces.h"
@@ -61,6 +62,35 @@ TEST(LetThrough, MovesLightFromOneSideToTheOtherAndKeepsItsSum) {
   let_through(1e30, opaque);
   EXPECT_EQ(opaque.diffuse, grey().diffuse);
   EXPECT_EQ(opaque.transmission, vec3(0.0f));
+}
+
+TEST(LetGlance, ChangesTheMeanHighlightByTheRatioAndLeavesWhiteMirrors) {
+  const auto mean = [](const Voxel& v) { return Highlight(v.specular, v.roughness2).mean_albedo().y; };
+  for (const double ratio : {0.5, 0.9, 1.0, 1.5}) {
+    Voxel voxel = grey();
+    voxel.specular = vec3(0.04f), voxel.roughness2 = 0.1f;
+    const float before = mean(voxel);
+    let_glance(ratio, voxel);
+    EXPECT_NEAR(mean(voxel), before * ratio / (1 - before + ratio * before), 1e-3) << ratio;
+    voxel.specular = vec3(1.0f, 0.0f, 1.0f);
+    let_glance(ratio, voxel);
+    EXPECT_NEAR(voxel.specular.x, 1, 1e-3) << ratio;
+    EXPECT_EQ(voxel.specular.y, 0) << ratio;
+  }
+  Voxel dull = grey();
+  dull.specular = vec3(0.0f);
+  let_glance(2, dull);
+  EXPECT_EQ(dull.specular, vec3(0.0f));
+}
+
+TEST(Recolor, MultipliesOddsByChannelAndLeavesWhite) {
+  Voxel voxel;
+  voxel.diffuse = vec3(0.2f, 0.5f, 0.0f), voxel.transmission = vec3(0.1f, 0.5f, 0.0f);
+  recolor({1.1f, 0.8f, 2.0f}, voxel);
+  EXPECT_NEAR(voxel.diffuse.x + voxel.transmission.x, 0.3f * 1.1f / (0.7f + 0.33f), 1e-6f);
+  EXPECT_NEAR(voxel.diffuse.x, 2 * voxel.transmission.x, 1e-6f);
+  EXPECT_NEAR(voxel.diffuse.y + voxel.transmission.y, 1, 1e-6f);
+  EXPECT_EQ(voxel.diffuse.z, 0);
 }
 
 SparseVolume voxelized(const Surface& geometry, double voxel_size) {

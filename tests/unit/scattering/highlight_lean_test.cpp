@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "scattering/albedo.h"
 #include "scattering/flake_phase.h"
 #include "tests/support/statistics.h"
 
@@ -12,11 +13,11 @@ namespace {
 using namespace test;
 
 TEST(HighlightLean, MultipliesWhatDarkFlakesReflectAndLeavesWhiteOnes) {
-  const vec3 gain = highlight_lean_gain(0.4f, -0.5f, vec3(0.0f, 0.5f, 1.0f));
+  const vec3 gain = odds_gain(vec3(0.0f, 0.5f, 1.0f), highlight_leaning(0.4f, -0.5f));
   EXPECT_NEAR(gain.x, 0.8f, 1e-6f);
   EXPECT_TRUE(gain.y > 0.8f && gain.y < 1);
   EXPECT_NEAR(gain.z, 1, 1e-6f);
-  EXPECT_EQ(highlight_lean_gain(0, 1, vec3(0.3f)), vec3(1.0f));
+  EXPECT_EQ(highlight_leaning(0, 1), 1.0f);
 }
 
 FlakeParams glossy(const SymMat3& s, const vec3& base, float lean) {

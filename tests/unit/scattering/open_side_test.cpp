@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "scattering/albedo.h"
 #include "scattering/flake_phase.h"
 #include "tests/support/statistics.h"
 
@@ -13,13 +14,13 @@ using namespace test;
 
 TEST(OpenSide, MultipliesDarkSidesAndLeavesWhiteOnes) {
   const vec3 up(0, 0, 1), open_side(0, 0, 0.2f);
-  const vec3 gain = open_side_gain(open_side, up, vec3(0.0f, 0.5f, 1.0f));
+  const vec3 gain = odds_gain(vec3(0.0f, 0.5f, 1.0f), side_opening(open_side, up));
   EXPECT_NEAR(gain.x, 1.2f, 1e-6f);
   EXPECT_GT(gain.y, 1.05f);
   EXPECT_LT(gain.y, 1.2f);
   EXPECT_NEAR(gain.z, 1, 1e-6f);
-  EXPECT_NEAR(open_side_gain(open_side, -up, vec3(0.0f)).x, 0.8f, 1e-6f);
-  EXPECT_EQ(open_side_gain(vec3(0.0f), up, vec3(0.3f)), vec3(1.0f));
+  EXPECT_NEAR(side_opening(open_side, -up), 0.8f, 1e-6f);
+  EXPECT_EQ(side_opening(vec3(0.0f), up), 1.0f);
 }
 
 TEST(OpenSide, GivesNoAlbedoAboveOne) {
@@ -27,7 +28,7 @@ TEST(OpenSide, GivesNoAlbedoAboveOne) {
   for (int i = 0; i < 1000; ++i) {
     const vec3 open_side = kMostOpenSide * vec3(random_direction(rng)), normal(random_direction(rng));
     const float base = rng.next();
-    const float albedo = base * open_side_gain(open_side, normal, vec3(base)).x;
+    const float albedo = base * odds_gain(vec3(base), side_opening(open_side, normal)).x;
     EXPECT_TRUE(albedo >= 0 && albedo <= 1 + 1e-6f) << albedo;
   }
 }
@@ -48,6 +49,22 @@ TEST(OpenSide, OfFlakesIsBrighterFromAboveThanFromBelow) {
   };
   EXPECT_NEAR(albedo_from(above), 0.05 * 1.3 / (0.95 + 0.05 * 1.3), 1e-4);
   EXPECT_NEAR(albedo_from(-above), 0.05 * 0.7 / (0.95 + 0.05 * 0.7), 1e-4);
+}
+
+// The highlight knows of its side as the base does, but for what facets reflect onto each other.
+TEST(OpenSide, OfGlossyFlakesHasABrighterHighlightFromAbove) {
+  const vec3 above = glm::normalize(vec3(0.4f, 0.1f, 0.8f));
+  FlakeParams p = horizontal_leaf(vec3(0.0f), 0);
+  p.specular = vec3(0.04f), p.roughness2 = 0.1f;
+  const auto albedo_from = [&](const vec3& wo, const vec3& open_side) {
+    p.open_side = open_side;
+    const FlakePhase phase(p, wo);
+    return mean_of(20000, 2, [&](Rng& r) { return phase.sample(r).weight; }).value.x;
+  };
+  const double even = albedo_from(above, vec3(0.0f));
+  const auto opened = [&](double opening) { return opening / (1 - even + opening * even); };
+  EXPECT_NEAR(albedo_from(above, vec3(0, 0, 0.3f)) / even, opened(1.3), 1e-2);
+  EXPECT_NEAR(albedo_from(-above, vec3(0, 0, 0.3f)) / even, opened(0.7), 1e-2);
 }
 
 // White furnace; and sample() and eval() are of one model.
