@@ -6,7 +6,7 @@
 //   1 + open_side.m
 //
 // times as much of its light away, of the base and of the highlight, as the flake does on the mean of its sides
-// (docs/decisions/0019, 0031). What stays meets the same leaf again: so it is the odds of albedos that are multiplied,
+// (docs/decisions/0019, 0033). What stays meets the same leaf again: so it is the odds of albedos that are multiplied,
 // and white stays white.
 #pragma once
 
