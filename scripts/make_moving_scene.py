@@ -89,9 +89,10 @@ def main():
     roots = doc["scenes"][doc.get("scene", 0)]["nodes"]
     rng = random.Random(11)
     movers = [i for i in roots if "mesh" in nodes[i] and "ground" not in nodes[i].get("name", "")]
+    originals = list(movers)
     spread = max(nodes[i].get("translation", (0, 0, 0))[0] for i in movers)
     for copy in range(1, options.copies):
-        for i in list(movers[:len(movers) // copy]):
+        for i in originals:
             node = json.loads(json.dumps(nodes[i]))
             x, y, z = node.get("translation", (0.0, 0.0, 0.0))
             node["translation"] = [x + rng.uniform(-0.5, 0.5) * spread, y, z + rng.uniform(-0.5, 0.5) * spread]
