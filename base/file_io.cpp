@@ -86,7 +86,8 @@ Result<std::string> read_small_file(const fs::path& path, uint64_t max_bytes) {
 Result<uint64_t> hash_file(const fs::path& path) {
   FARFIELD_TRY_LET(const auto file, open_regular_file(path));
   const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), XXH3_freeState);
-  if (!state || XXH3_64bits_reset(state.get()) != XXH_OK) return make_error(ErrorCode::Io, "out of memory");
+  if (!state || XXH3_64bits_reset(state.get()) != XXH_OK)
+    return make_error(ErrorCode::Io, fmt::format("cannot read {}: out of memory", path.string()));
   std::array<std::byte, 16 * 1024> piece;
   for (uint64_t left = file.bytes; left > 0;) {
     const auto part = std::span(piece).first(std::min<uint64_t>(left, piece.size()));
