@@ -6,7 +6,7 @@
 
 namespace farfield {
 
-/// verify_asset() with every level loaded as the runtime does it, one after the other.
+/// verify_asset() with every level and every morph loaded as the runtime does it, one after the other.
 VerifyResult verify_and_measure_asset(const std::filesystem::path& asset_dir);
 
 }  // namespace farfield

@@ -5,13 +5,15 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <xxhash.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
-#include <limits>
+#include <memory>
 #include <system_error>
 
 #include "base/bytes.h"
-#include "base/hash.h"
 #include "base/result.h"
 #include "base/temporary_file.h"
 
@@ -80,9 +82,20 @@ Result<std::string> read_small_file(const fs::path& path, uint64_t max_bytes) {
   return text;
 }
 
+// Piece by piece: a shot hashes its frames while a budget counts what the process holds.
 Result<uint64_t> hash_file(const fs::path& path) {
-  FARFIELD_TRY_LET(const auto bytes, read_small_file(path, std::numeric_limits<uint64_t>::max()));
-  return hash_bytes(std::as_bytes(std::span(bytes)));
+  FARFIELD_TRY_LET(const auto file, open_regular_file(path));
+  const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), XXH3_freeState);
+  if (!state || XXH3_64bits_reset(state.get()) != XXH_OK)
+    return make_error(ErrorCode::Io, fmt::format("cannot read {}: out of memory", path.string()));
+  std::array<std::byte, 16 * 1024> piece;
+  for (uint64_t left = file.bytes; left > 0;) {
+    const auto part = std::span(piece).first(std::min<uint64_t>(left, piece.size()));
+    FARFIELD_TRY(read_fully(file.descriptor.get(), part, path));
+    XXH3_64bits_update(state.get(), part.data(), part.size());
+    left -= part.size();
+  }
+  return XXH3_64bits_digest(state.get());
 }
 
 Result<void> sync_file(const fs::path& path) {

@@ -339,36 +339,44 @@ bool InstanceGeometry::is_plain(unsigned ray_count, const EmbreeContext& context
   return ray_count == 1 && is_of_ray_context(context) && !context.filter && !has_filters && !is_nested(context);
 }
 
+namespace {
+
+/// What the host has passed to the query that a callback belongs to. In Embree 4 `args.context` is a base of it.
+template <typename Arguments>
+EmbreeContext& given_context(const Arguments& args) {
+  return *static_cast<EmbreeContext*>(args.context);
+}
+
+}  // namespace
+
 void InstanceGeometry::intersect_callback(const RTCIntersectFunctionNArguments* args) {
   const auto& self = *static_cast<const InstanceGeometry*>(args->geometryUserPtr);
-  if (!self.is_plain(args->N, *args->context)) return self.intersect_others(args);
+  EmbreeContext& given = given_context(*args);
+  if (!self.is_plain(args->N, given)) return self.intersect_others(args);
   if (args->valid[0] == 0) return;
-  auto& context = *reinterpret_cast<RayContext*>(args->context);
+  auto& context = reinterpret_cast<RayContext&>(given);
   auto& ray_hit = *reinterpret_cast<EmbreeRayHit*>(args->rayhit);
-  self.intersect(args->primID, args->geomID, ray_hit, context, args->context, &context.hit);
+  self.intersect(args->primID, args->geomID, ray_hit, context, &given, &context.hit);
 }
 
 void InstanceGeometry::occluded_callback(const RTCOccludedFunctionNArguments* args) {
   const auto& self = *static_cast<const InstanceGeometry*>(args->geometryUserPtr);
-  if (!self.is_plain(args->N, *args->context)) return self.occlude_others(args);
+  EmbreeContext& given = given_context(*args);
+  if (!self.is_plain(args->N, given)) return self.occlude_others(args);
   if (args->valid[0] == 0) return;
-  auto& context = *reinterpret_cast<RayContext*>(args->context);
-  self.occluded(args->primID, *reinterpret_cast<EmbreeRay*>(args->ray), context, args->context);
+  auto& context = reinterpret_cast<RayContext&>(given);
+  self.occluded(args->primID, *reinterpret_cast<EmbreeRay*>(args->ray), context, &given);
 }
 
 void InstanceGeometry::intersect_others(const RTCIntersectFunctionNArguments* args) const {
-  if (is_nested(*args->context)) return source_.refuse_nested();
+  EmbreeContext& given = given_context(*args);
+  if (is_nested(given)) return source_.refuse_nested();
   const auto intersect_one = [&](EmbreeRayHit& ray_hit, bool is_single) {
     std::optional<RayContext> fallback;
-    RayContext& context = context_of(*args->context, ray_hit.ray, fallback);
-    const bool has_own = is_single || &context.embree != args->context;  // lanes that share one leave no record
-    const Query query{context,
-                      args->context,
-                      args->primID,
-                      args->geomID,
-                      has_filters || args->context->filter,
-                      ask_intersection_filters,
-                      args};
+    RayContext& context = context_of(given, ray_hit.ray, fallback);
+    const bool has_own = is_single || &context.embree != &given;  // lanes that share one leave no record
+    const Query query{
+        context, &given, args->primID, args->geomID, has_filters || given.filter, ask_intersection_filters, args};
     return intersect_filtered(query, ray_hit, has_own ? &context.hit : nullptr);
   };
   if (args->N == 1) {
@@ -382,7 +390,7 @@ void InstanceGeometry::intersect_others(const RTCIntersectFunctionNArguments* ar
     EmbreeRayHit ray_hit;
     ray_hit.ray = rtcGetRayFromRayN(rays, args->N, lane);
     ray_hit.hit.geomID = kNoGeometry;
-    ray_hit.hit.instID[0] = args->context->instID[0];
+    ray_hit.hit.instID[0] = given.instID[0];
     if (!intersect_one(ray_hit, false)) continue;
     RTCRayN_tfar(rays, args->N, lane) = ray_hit.ray.tfar;
     rtcCopyHitToHitN(hits, &ray_hit.hit, args->N, lane);
@@ -390,16 +398,17 @@ void InstanceGeometry::intersect_others(const RTCIntersectFunctionNArguments* ar
 }
 
 void InstanceGeometry::occlude_others(const RTCOccludedFunctionNArguments* args) const {
-  if (is_nested(*args->context)) return source_.refuse_nested();
+  EmbreeContext& given = given_context(*args);
+  if (is_nested(given)) return source_.refuse_nested();
   const auto is_occluded = [&](EmbreeRay& ray) {
     std::optional<RayContext> fallback;
-    RayContext& context = context_of(*args->context, ray, fallback);
-    if (!has_filters && !args->context->filter) return occluded(args->primID, ray, context, &context.embree);
+    RayContext& context = context_of(given, ray, fallback);
+    if (!has_filters && !given.filter) return occluded(args->primID, ray, context, &context.embree);
     EmbreeRayHit ray_hit;  // filters want to know the hit
     ray_hit.ray = ray;
     ray_hit.hit.geomID = kNoGeometry;
-    ray_hit.hit.instID[0] = args->context->instID[0];
-    const Query query{context, args->context, args->primID, args->geomID, true, ask_occlusion_filters, args};
+    ray_hit.hit.instID[0] = given.instID[0];
+    const Query query{context, &given, args->primID, args->geomID, true, ask_occlusion_filters, args};
     return intersect_filtered(query, ray_hit, nullptr);
   };
   if (args->N == 1) {

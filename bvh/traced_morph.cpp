@@ -132,14 +132,14 @@ float mix(float a, float b, float t) { return (1 - t) * a + t * b; }
 /// The faces of both levels by what becomes of them.
 struct TracedMorph::SortedFaces {
   std::array<MorphFaces, kGeometryCount> of;
-  bool some_fade_out = false;
   uint64_t table_bytes = 0;  ///< that sorting took beside the faces
 
   /// targets: per face of the finer level, as coarse_face().
   SortedFaces(const LevelView& fine, const LevelView& coarse, std::span<const uint32_t> targets) {
     const std::vector<vec3> ends = ends_of(fine, coarse);
     std::vector<uint8_t> is_reached(face_count(coarse), 0);
-    FaceAdder staying(fine, of[kStaying]), moving(fine, of[kMoving]), fading_in(coarse, of[kFadingIn]);
+    FaceAdder staying(fine, of[kStaying]), moving(fine, of[kMoving]), fading_out(fine, of[kFadingOut]),
+        fading_in(coarse, of[kFadingIn]);
     const auto face_moves = [&](uint32_t element, uint32_t target) {
       const uvec3 corners = corners_of(fine, element);
       const auto moves = [&](uint32_t vertex) { return ends[vertex] != fine.positions[vertex]; };
@@ -147,14 +147,18 @@ struct TracedMorph::SortedFaces {
     };
     for (uint32_t quad = 0; quad < fine.quads.size(); ++quad) {
       const std::span<const uint32_t> quad_targets = targets.subspan(fine.quad_first_face[quad], sides(fine, quad));
-      uint32_t moving_sides = 0;
+      if (std::ranges::count(quad_targets, kMorphVoxelized) == std::ssize(quad_targets)) {
+        fading_out.add_quad(quad);
+        continue;
+      }
+      uint32_t moving_sides = 0, fading_sides = 0;
       for (uint32_t side = 0; side < quad_targets.size(); ++side) {
         const uint32_t target = quad_targets[side];
-        some_fade_out |= target == kMorphVoxelized;
         if (target < is_reached.size()) is_reached[target] = 1;
         moving_sides |= uint32_t{face_moves(2 * quad + side, target)} << side;
+        fading_sides |= uint32_t{target == kMorphVoxelized} << side;
       }
-      if (moving_sides == 0) {
+      if (moving_sides == 0 && fading_sides == 0) {
         staying.add_quad(quad);
         continue;
       }
@@ -162,7 +166,7 @@ struct TracedMorph::SortedFaces {
         if (moving_sides >> side & 1) {
           moving.add_moving_face(2 * quad + side, ends);
         } else {
-          staying.add_face(2 * quad + side);
+          (fading_sides >> side & 1 ? fading_out : staying).add_face(2 * quad + side);
         }
       }
     }
@@ -176,7 +180,7 @@ struct TracedMorph::SortedFaces {
         if (!reached[side]) fading_in.add_face(2 * quad + side);
       }
     }
-    table_bytes = ends.size() * (sizeof(vec3) + 2 * sizeof(uint32_t)) + coarse.positions.size() * sizeof(uint32_t) +
+    table_bytes = ends.size() * (sizeof(vec3) + 3 * sizeof(uint32_t)) + coarse.positions.size() * sizeof(uint32_t) +
                   is_reached.size();
   }
   size_t count() const {
@@ -203,13 +207,13 @@ Result<std::unique_ptr<TracedMorph>> TracedMorph::make(BvhDevice& device, const 
   for (size_t i = 0; i < kGeometryCount; ++i) morph->elements_[i] = faces.of[i].elements;
   if (faces.count() == 0) return morph;  // volumes alone
 
-  const bool are_opaque = is_opaque(fine) && is_opaque(coarse);
+  morph->are_opaque_ = is_opaque(fine) && is_opaque(coarse);
   const auto make_geometries = [&] {
     std::vector<EmbreeGeometry> geometries;
     for (unsigned i = 0; i < kGeometryCount; ++i) {
       geometries.push_back(make_geometry(device.handle(), faces.of[i]));
-      const bool fades = i == kFadingIn || (i == kStaying && faces.some_fade_out);
-      if (geometries.back() && (fades || !are_opaque)) set_filter(geometries.back().get(), filter, morph.get());
+      const bool fades = i == kFadingIn || i == kFadingOut;
+      if (geometries.back() && (fades || !morph->are_opaque_)) set_filter(geometries.back().get(), filter, morph.get());
     }
     return geometries;
   };
@@ -250,22 +254,24 @@ TracedMorph::FaceHit TracedMorph::face_of(const EmbreeHit& hit) const {
   return {(element ^ kEitherFace) + quad_side(hit.u, hit.v), face_barycentric(hit.u, hit.v)};
 }
 
-/// Whether a hit counts: it may be half there, in a gap, or clear.
+/// Whether a hit counts: it may be half there, in a gap, or clear. Of a tree, nearly all hits are on leaves that fade:
+/// whether one is there depends on the place alone, so tables are read only for those that are.
 bool TracedMorph::stops(const EmbreeFilterArguments& args) const {
   const auto& context = *reinterpret_cast<const RayContext*>(args.context);
   const auto& ray = *reinterpret_cast<const EmbreeRay*>(args.ray);
   const auto& hit = *reinterpret_cast<const EmbreeHit*>(args.hit);
-  const bool is_new = hit.geomID == kFadingIn;
-  const TracedLevel& level = is_new ? *coarse_ : *fine_;
-  const auto [element, barycentric] = face_of(hit);
-  const uint32_t face = level.face_of(element / 2, element % 2);
-  const uint32_t target = is_new ? kMorphVoxelized : coarse_face_[face];
+  const bool is_new = hit.geomID == kFadingIn, fades = is_new || hit.geomID == kFadingOut;
   const float t = ray.time;
-  if (target == kMorphVoxelized) {
+  if (fades) {
     const float cell = kFadingCell * coarse_->view.header.resolution;
     const bool is_replaced = path_number(context, ray, cell, kFadingSalt) < t;
     if (is_replaced != is_new) return false;
+    if (are_opaque_) return true;
   }
+  const TracedLevel& level = is_new ? *coarse_ : *fine_;
+  const auto [element, barycentric] = face_of(hit);
+  const uint32_t face = level.face_of(element / 2, element % 2);
+  const uint32_t target = fades ? kMorphVoxelized : coarse_face_[face];
   const bool becomes_face = target < coarse_->face_count;
   float gap = gap_of(level.view, face);
   if (becomes_face) gap = mix(gap, gap_of(coarse_->view, target), t);

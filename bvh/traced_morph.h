@@ -53,7 +53,7 @@ class TracedMorph {
   LevelCost cost(const LevelView& fine_level, const LevelView& coarse_level) const;
 
  private:
-  enum Geometry : unsigned { kStaying, kMoving, kFadingIn, kGeometryCount };
+  enum Geometry : unsigned { kStaying, kMoving, kFadingOut, kFadingIn, kGeometryCount };
   struct SortedFaces;
   TracedMorph() = default;
   static Result<std::unique_ptr<TracedMorph>> make(BvhDevice& device, const LevelView& fine_level,
@@ -72,6 +72,7 @@ class TracedMorph {
   const TracedLevel* fine_ = nullptr;
   const TracedLevel* coarse_ = nullptr;
   MeasuredScene built_;
+  bool are_opaque_ = false;  ///< both levels: a face that is there stops every ray
   uint64_t making_bytes_ = 0;
   std::vector<uint32_t> coarse_face_;
   std::array<std::vector<uint32_t>, kGeometryCount> elements_;  ///< per geometry and primitive

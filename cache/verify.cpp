@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <memory>
 #include <set>
 
 #include "base/file_io.h"
@@ -20,15 +20,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// What the next coarser level's morph map must fit.
-struct FinerLevel {
-  uint64_t vertices = 0;
-  uint64_t faces = 0;
-};
-
 class Verifier {
  public:
-  Verifier(const fs::path& folder, const MeasureCost& measure) : folder_(folder), measure_(measure) {}
+  Verifier(const fs::path& folder, const CostMeasures& measure) : folder_(folder), measure_(measure) {}
 
   VerifyResult run() {
     const Result<Manifest> manifest = read_manifest(folder_);
@@ -45,9 +39,9 @@ class Verifier {
                       "asset again to have one",
                       file_));
     }
-    std::optional<FinerLevel> finer;
+    std::unique_ptr<LevelFile> finer;
     for (const LevelEntry& entry : manifest->levels) {
-      finer = check_level(entry, finer, entry.level == manifest->levels.front().level);
+      finer = check_level(entry, finer.get(), entry.level == manifest->levels.front().level);
     }
     for (const AssetTexture& texture : manifest->textures) check_texture(texture);
     check_folder();
@@ -68,10 +62,10 @@ class Verifier {
     if (manifest_says != file_says) mismatch(what, fmt::to_string(manifest_says), fmt::to_string(file_says));
   }
 
-  std::optional<FinerLevel> check_level(const LevelEntry& entry, const std::optional<FinerLevel>& finer,
-                                        bool is_first) {
+  /// Returns the level; null if it could not be read. finer: the next finer stored one, null if that could not be.
+  std::unique_ptr<LevelFile> check_level(const LevelEntry& entry, const LevelFile* finer, bool is_first) {
     file_ = entry.file;
-    const auto opened = LevelFile::open(folder_ / entry.file, LevelCheck::Full);
+    auto opened = LevelFile::open(folder_ / entry.file, LevelCheck::Full);
     if (!opened) {
       error(opened.error().message);
       return {};
@@ -90,11 +84,14 @@ class Verifier {
     expect_count("the level's number", entry.level, level.header.level);
     check_resolution(entry, level);
     check_resident_bytes(entry, level);
-    if (measure_) check_cost(entry, level);
+    if (measure_.level) check_cost("it", {entry.resident_bytes, entry.build_peak_bytes}, measure_.level(level));
     check_bounds(level);
     check_hull(level);
     check_morph(level, finer, is_first);
-    return FinerLevel{level.positions.size(), face_count(level)};
+    if (measure_.morph && entry.morph && finer) {
+      check_cost("its morph from the next finer level", *entry.morph, measure_.morph(finer->view(), level));
+    }
+    return std::move(*opened);
   }
 
   void check_texture(const AssetTexture& texture) {
@@ -129,18 +126,18 @@ class Verifier {
                       entry.resident_bytes, least));
   }
 
-  void check_cost(const LevelEntry& entry, const LevelView& level) {
-    const Result<LevelCost> cost = measure_(level);
-    if (!cost) return error(fmt::format("{}: it cannot be loaded: {}", file_, cost.error().message));
-    const uint64_t measured = cost->resident_bytes + cost->build_peak_bytes;
-    const uint64_t promised = entry.resident_bytes + entry.build_peak_bytes;
-    if (measured == promised && cost->resident_bytes == entry.resident_bytes) return;
-    const bool is_lie = promised / 2 < measured / 3;
+  /// what: "it", "its morph". promised: by the manifest, whose plans are kept to within its figures.
+  void check_cost(const char* what, const LevelCost& promised, const Result<LevelCost>& cost) {
+    if (!cost) return error(fmt::format("{}: {} cannot be loaded: {}", file_, what, cost.error().message));
+    const uint64_t measured_sum = cost->resident_bytes + cost->build_peak_bytes;
+    const uint64_t promised_sum = promised.resident_bytes + promised.build_peak_bytes;
+    if (measured_sum == promised_sum && cost->resident_bytes == promised.resident_bytes) return;
+    const bool is_lie = promised_sum / 2 < measured_sum / 3;
     add(is_lie ? Finding::Severity::Error : Finding::Severity::Warning,
-        fmt::format(
-            "{}: it takes {} bytes, and {} more while it is loaded; the manifest says {} and {}; bake the asset "
-            "again on this kind of processor",
-            file_, cost->resident_bytes, cost->build_peak_bytes, entry.resident_bytes, entry.build_peak_bytes));
+        fmt::format("{}: {} takes {} bytes, and {} more while it is loaded; the manifest says {} and {}; bake the "
+                    "asset again on this kind of processor",
+                    file_, what, cost->resident_bytes, cost->build_peak_bytes, promised.resident_bytes,
+                    promised.build_peak_bytes));
   }
 
   void check_bounds(const LevelView& level) {
@@ -159,13 +156,13 @@ class Verifier {
   }
 
   /// A morph map has an entry for each vertex and face of the next finer stored level, or is absent.
-  void check_morph(const LevelView& level, const std::optional<FinerLevel>& finer, bool is_first) {
+  void check_morph(const LevelView& level, const LevelFile* finer, bool is_first) {
     const bool has_morph = !level.morph_vertex.empty() || !level.morph_face.empty();
     if (!has_morph) return;
     if (is_first) return error(fmt::format("{}: the finest level has a morph map; bake the asset again", file_));
     if (!finer) return;  // that level could not be read, which is a finding already
-    expect_morph("vertices", level.morph_vertex.size(), finer->vertices);
-    expect_morph("faces", level.morph_face.size(), finer->faces);
+    expect_morph("vertices", level.morph_vertex.size(), finer->view().positions.size());
+    expect_morph("faces", level.morph_face.size(), face_count(finer->view()));
   }
   void expect_morph(const char* what, uint64_t mapped, uint64_t expected) {
     if (mapped == expected) return;
@@ -191,7 +188,7 @@ class Verifier {
   }
 
   const fs::path& folder_;
-  const MeasureCost& measure_;
+  const CostMeasures& measure_;
   const Manifest* manifest_ = nullptr;
   std::string file_;  ///< what is being checked
   VerifyResult result_;
@@ -203,7 +200,7 @@ bool VerifyResult::is_sound() const {
   return std::ranges::none_of(findings, [](const Finding& f) { return f.severity == Finding::Severity::Error; });
 }
 
-VerifyResult verify_asset(const fs::path& asset_dir, const MeasureCost& measure) {
+VerifyResult verify_asset(const fs::path& asset_dir, const CostMeasures& measure) {
   return Verifier(asset_dir, measure).run();
 }
 

@@ -32,12 +32,16 @@ struct VerifyResult {
   bool is_sound() const;
 };
 
-/// What a level takes once loaded, measured. Errors: what went wrong.
-using MeasureCost = std::function<Result<LevelCost>(const LevelView&)>;
+/// What takes how much once loaded, measured. Errors: what went wrong.
+struct CostMeasures {
+  std::function<Result<LevelCost>(const LevelView& level)> level;
+  /// The morph between two neighbouring stored levels, beside them.
+  std::function<Result<LevelCost>(const LevelView& fine, const LevelView& coarse)> morph;
+};
 
-/// Reads the whole folder. Never fails: whatever goes wrong is a finding. With `measure`, what levels take is held
-/// against the manifest: less than two thirds of it there is an error, any other difference a warning, as BVHs differ
-/// between processors. Any thread; nobody may write meanwhile.
-VerifyResult verify_asset(const std::filesystem::path& asset_dir, const MeasureCost& measure = {});
+/// Reads the whole folder. Never fails: whatever goes wrong is a finding. What levels and morphs take is held against
+/// the manifest, where there is a measure: less than two thirds of it there is an error, any other difference a
+/// warning, as BVHs differ between processors. Any thread; nobody may write meanwhile.
+VerifyResult verify_asset(const std::filesystem::path& asset_dir, const CostMeasures& measure = {});
 
 }  // namespace farfield

@@ -102,14 +102,13 @@ dmat4 local_matrix(const GltfScene& scene, const GltfNode& node, double seconds)
   return to_matrix(transform);
 }
 
-std::vector<dmat4> world_matrices(const GltfScene& scene, double seconds) {
-  std::vector<dmat4> world;
+void set_world_matrices(const GltfScene& scene, double seconds, std::vector<dmat4>& world) {
+  world.clear();
   world.reserve(scene.nodes.size());
   for (const GltfNode& node : scene.nodes) {
     const dmat4 local = local_matrix(scene, node, seconds);
     world.push_back(node.parent < 0 ? local : world[static_cast<size_t>(node.parent)] * local);
   }
-  return world;
 }
 
 dmat4 world_matrix(const GltfScene& scene, uint32_t node, double seconds) {
@@ -373,7 +372,8 @@ class SceneReader {
   }
 
   Result<void> place_everything(const std::vector<int>& order) {
-    const std::vector<dmat4> world = world_matrices(scene_, 0);
+    std::vector<dmat4> world;
+    set_world_matrices(scene_, 0, world);
     const std::vector<bool> hidden = hidden_nodes(document_);
     for (uint32_t i = 0; i < order.size(); ++i) {
       const auto number = static_cast<size_t>(order[i]);
@@ -606,17 +606,24 @@ bool GltfScene::do_instances_move() const {
 }
 
 std::vector<GltfInstance> GltfScene::instances_at(double seconds) const {
-  if (in_node.empty()) return instances;
-  const std::vector<dmat4> world = world_matrices(*this, seconds);
   std::vector<GltfInstance> placed;
-  placed.reserve(instances.size());
-  for (size_t i = 0; i < instances.size(); ++i) {
-    const dmat4 to_world = world[instances[i].node] * to_square(in_node[i]);
-    if (!is_invertible(to_world)) continue;
-    placed.push_back(instances[i]);
-    placed.back().to_world = to_affine(to_world, origin_world);
-  }
+  std::vector<dmat4> of_nodes;
+  place_at(seconds, placed, of_nodes);
   return placed;
+}
+
+void GltfScene::place_at(double seconds, std::vector<GltfInstance>& placed, std::vector<dmat4>& of_nodes) const {
+  placed = instances;
+  if (in_node.empty()) return;
+  set_world_matrices(*this, seconds, of_nodes);
+  size_t count = 0;
+  for (size_t i = 0; i < instances.size(); ++i) {
+    const dmat4 to_world = of_nodes[instances[i].node] * to_square(in_node[i]);
+    if (!is_invertible(to_world)) continue;
+    if (count != i) placed[count] = instances[i];
+    placed[count++].to_world = to_affine(to_world, origin_world);
+  }
+  placed.resize(count);
 }
 
 Box3 GltfScene::bounds_world() const {

@@ -124,6 +124,8 @@ struct GltfScene {
   bool do_instances_move() const;
   /// All instances at a time. An instance whose transform is singular then is left out.
   std::vector<GltfInstance> instances_at(double seconds) const;
+  /// The same into `placed`. Takes no memory where both have room from an earlier time; `of_nodes`: to work in.
+  void place_at(double seconds, std::vector<GltfInstance>& placed, std::vector<glm::dmat4>& of_nodes) const;
   /// Frame n shows the time n / frames_per_second; frame 0 is time 0, as Blender exports it.
   double seconds_of_frame(double frame) const { return frame / frames_per_second; }
   /// World bounds of the instances where `instances` has them, from GltfMesh::bounds. Empty when there are none.

@@ -138,23 +138,31 @@ class PlacedInstances {
   /// shutter is open, all stand as they do in the middle, and it is said.
   Change move_to(std::span<const double> times, const RenderOptions& options) {
     if (!do_move_) return Change::None;
-    Keys keys;
-    for (const double seconds : times) keys.push_back(scene_.instances_at(seconds));
-    if (!std::ranges::all_of(keys, [&](const auto& key) { return same_instances(key, keys.front()); })) {
-      keys = {keys[keys.size() / 2]};
+    if (keys_.size() != times.size()) keys_.assign(times.size(), {});  // the first frame, or the one before had no blur
+    std::vector<Change> changes;
+    for (size_t i = 0; i < times.size(); ++i) {
+      scene_.place_at(times[i], next_, of_nodes_);
+      changes.push_back(!same_instances(next_, keys_[i]) ? Change::Instances
+                        : !same_places(next_, keys_[i])  ? Change::Places
+                                                         : Change::None);
+      keys_[i].swap(next_);
+    }
+    if (next_.empty()) next_ = keys_.front();  // takes all memory for good, before assets do
+    if (!std::ranges::all_of(keys_, [&](const auto& key) { return same_instances(key, keys_.front()); })) {
+      const size_t middle = keys_.size() / 2;
+      keys_ = {std::move(keys_[middle])};
+      changes = {changes[middle]};
       options.warning("no motion blur of instances in frames in which some appear or vanish");
     }
-    const Change change = keys_.empty() || !same_instances(keys.front(), keys_.front()) ? Change::Instances
-                          : !std::ranges::equal(keys, keys_, same_places)               ? Change::Places
-                                                                                        : Change::None;
-    keys_ = std::move(keys);
-    return change;
+    return *std::ranges::max_element(changes);
   }
 
  private:
   const GltfScene& scene_;
   bool do_move_;
   Keys keys_;
+  std::vector<GltfInstance> next_;    // to work in
+  std::vector<glm::dmat4> of_nodes_;  // too
 };
 
 void report_problems(const RenderOptions& options, const FrameReport& frame) {
@@ -230,6 +238,9 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
   // As many threads as parallel_for uses: a default device would lift a limit on them.
   FARFIELD_TRY_LET(auto device, make_embree_device(thread_count()));
   FARFIELD_TRY(warm_up(device.get(), film.image(), any_has_textures(asset_folders_)));
+  PlacedInstances instances(scene_);
+  std::vector<double> times = shutter_times(scene_, options_.shutter, frames.front());
+  PlacedInstances::Change change = instances.move_to(times, options_);
 
   RenderReport report;
   report.assets = asset_names_;
@@ -238,10 +249,12 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
   const PeakMemory memory;
 
   std::unique_ptr<RenderSession> session;
-  PlacedInstances instances(scene_);
   for (size_t i = 0; i < frames.size(); ++i) {
-    const std::vector<double> times = shutter_times(scene_, options_.shutter, frames[i]);
-    const PlacedInstances::Change change = instances.move_to(times, options_);
+    if (i > 0) {
+      malloc_trim(0);  // what writing the last frame left in the heap is not the assets'
+      times = shutter_times(scene_, options_.shutter, frames[i]);
+      change = instances.move_to(times, options_);
+    }
     if (!session || change == PlacedInstances::Change::Instances) {
       session.reset();  // before the next one, so that two never share the budget
       FARFIELD_TRY_LET(auto opened,

@@ -35,8 +35,8 @@ class FrameRenderer {
   /// Names of the meshes that are shown, in the order of FrameReport::finest_level.
   const std::vector<std::string>& asset_names() const { return asset_names_; }
 
-  /// Renders frames in the order given. The process's memory is measured from just before the assets are opened.
-  /// Errors: those of warm_up, RenderSession and the sink; Cancelled.
+  /// Renders frames, at least one, in the order given. The process's memory is measured from just before the assets are
+  /// opened. Errors: those of warm_up, RenderSession and the sink; Cancelled.
   Result<RenderReport> render(std::span<const int> frames, const FrameSink& sink);
 
   /// Looks at a pixel of a frame; x and y lie in the picture. Errors: those of RenderSession.

@@ -168,7 +168,7 @@ Result<FrameReport> RenderSession::render(std::span<const Camera> camera, const 
   const std::vector<std::vector<LevelRecord>> levels_before = level_stats();
   FARFIELD_TRY_LET(auto plan, this->plan(camera, options));
   runtime_->prefetch();
-  malloc_trim(0);  // what writing the last frame left in the heap is not the assets'
+  malloc_trim(0);  // nor is what moving and planning left there
 
   const TraceScene scene{scene_.get(), runtime_.get(), &lights, &ids_};
   FARFIELD_TRY_LET(const auto traced, path_trace(scene, camera, options.trace, film, job));

@@ -134,29 +134,39 @@ Result<void> write_warm_up_asset(const fs::path& folder, bool with_textures) {
   return write_manifest(folder, manifest);
 }
 
-// Both levels, seen from near and from far, under a light with a disc.
+// From near and from far, which shows both levels.
+Result<void> trace_twice(Runtime& runtime, EmbreeSceneRef scene, const Lights& lights, Film& film) {
+  TraceOptions trace;
+  trace.samples_per_pixel = 4;
+  for (const float distance : {1.5f, 10.0f}) {
+    const vec3 forward = glm::normalize(vec3(-1.0f));
+    const Camera camera = Camera::perspective(vec3(0.5f * kSize) - kSize * distance * forward, forward,
+                                              vec3(0.0f, 1.0f, 0.0f), 1.0f / distance, film.width(), film.height());
+    runtime.set_cameras({camera.tessellation()});
+    FARFIELD_TRY(runtime.plan_frame());
+    runtime.prefetch();
+    if (auto result = path_trace({scene, &runtime, &lights}, camera, trace, film); !result)
+      return tl::unexpected(result.error());
+  }
+  return {};
+}
+
+// Under a light with a disc, in scenes of every kind that a session builds: Embree's code for each is some 500 KB.
 Result<void> trace_warm_up_asset(EmbreeDeviceRef device, const fs::path& folder) {
   RuntimeOptions options;
   options.budget_bytes = kBudget;
   FARFIELD_TRY_LET(auto runtime, Runtime::create(device, options));
   FARFIELD_TRY_LET(const auto asset, runtime->open_asset(folder.string()));
-  FARFIELD_TRY(runtime->add_instance(asset, mat4x3(1.0f)));
-  FARFIELD_TRY_LET(const auto scene, make_scene(device, *runtime));
-
+  FARFIELD_TRY_LET(const auto instance, runtime->add_instance(asset, mat4x3(1.0f)));
   Lights lights;
   lights.environment = Environment::sun_sky({});
-  TraceOptions trace;
-  trace.samples_per_pixel = 4;
-  Film film(64, 64);
-  for (const float distance : {1.5f, 10.0f}) {
-    const vec3 forward = glm::normalize(vec3(-1.0f));
-    const Camera camera = Camera::perspective(vec3(0.5f * kSize) - kSize * distance * forward, forward,
-                                              vec3(0.0f, 1.0f, 0.0f), 1.0f / distance, film.width(), film.height());
-    runtime->set_cameras({camera.tessellation()});
-    FARFIELD_TRY(runtime->plan_frame());
-    runtime->prefetch();
-    const TraceScene traced{scene.get(), runtime.get(), &lights};
-    if (auto result = path_trace(traced, camera, trace, film); !result) return tl::unexpected(result.error());
+  Film film(64, 64), few_rays(8, 8);
+  for (const bool moves : {false, true}) {
+    if (moves) FARFIELD_TRY(runtime->move_instance(instance, {mat4x3(1.0f), mat4x3(1.01f)}));
+    for (const bool is_small : {true, false}) {
+      FARFIELD_TRY_LET(const auto scene, make_scene(device, *runtime, is_small));
+      FARFIELD_TRY(trace_twice(*runtime, scene.get(), lights, moves || is_small ? few_rays : film));
+    }
   }
   return {};
 }

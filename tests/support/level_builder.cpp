@@ -134,6 +134,24 @@ LevelData triangle_soup(uint32_t count, float size, uint64_t seed) {
   return level;
 }
 
+std::vector<LevelData> foliage(uint32_t leaves, uint64_t seed) {
+  std::vector<LevelData> levels;
+  for (uint32_t k = 0; k < 5; ++k) {
+    LevelData level = triangle_soup(leaves >> (2 * k), 0.02f * static_cast<float>(1u << k), seed + k);
+    level.header.level = k;
+    level.header.resolution = 0.005f * static_cast<float>(1u << k);
+    if (k > 0) level.morph_vertex.assign(levels.back().positions.size(), 0);
+    if (k > 1) {
+      const int bricks = 64 >> k;
+      set_volume(level, ivec3(bricks / 2), vec3(-0.3f),
+                 [&](int x, int y, int z) { return (x * 7 + y * 3 + z) % 3 == 0 ? 2.0f : 0.0f; });
+    }
+    set_diffuse(level, vec3(0.5f));
+    levels.push_back(std::move(level));
+  }
+  return levels;
+}
+
 LevelData sphere_level(const vec3& center, float radius, uint32_t rings, uint32_t k, float resolution) {
   const uint32_t sectors = 2 * rings;
   std::vector<vec3> positions{center + vec3(0, 0, radius), center - vec3(0, 0, radius)};

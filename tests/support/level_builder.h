@@ -44,6 +44,9 @@ void set_diffuse(LevelData& level, const vec3& albedo);
 /// `count` random triangles of size about `size` in the unit cube.
 LevelData triangle_soup(uint32_t count, float size, uint64_t seed);
 
+/// Foliage of five levels that get four times lighter each, the coarser ones with voxels; in the unit cube.
+std::vector<LevelData> foliage(uint32_t leaves, uint64_t seed);
+
 /// A closed sphere of quads, latitude-longitude, with lone triangles at the poles.
 LevelData sphere_level(const vec3& center, float radius, uint32_t rings, uint32_t k = 0, float resolution = 0.1f);
 

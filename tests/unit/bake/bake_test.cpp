@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "bake/bake_workspace.h"
+#include "bake/measure_levels.h"
 #include "base/hash.h"
 #include "base/parallel.h"
 #include "bvh/level_scene.h"
@@ -548,6 +549,27 @@ TEST_F(Bake, MeasuresLevelsAsTheRuntimeLoadsThemUnlessToldOtherwise) {
     EXPECT_EQ(entry.build_peak_bytes, cost->build_peak_bytes) << entry.level;
     EXPECT_EQ(entry.ray_cost, ray_cost((*file)->view())) << entry.level;
   }
+}
+
+TEST_F(Bake, VerifyFindsAManifestThatLiesAboutMorphs) {
+  BakeOptions options = small_options();
+  options.measure_resident = nullptr;
+  const auto report = bake(ball_in_leaves(), "thing", out(), options);
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_TRUE(verify_and_measure_asset(out()).findings.empty());
+  Manifest manifest = report->manifest;
+  ASSERT_GE(manifest.levels.size(), 2u);
+  LevelEntry& coarser = manifest.levels[1];
+  ASSERT_TRUE(coarser.morph);
+  const uint64_t truth = coarser.morph->resident_bytes + coarser.morph->build_peak_bytes;
+  coarser.morph = LevelCost{truth / 4, truth / 4};
+  ASSERT_TRUE(write_manifest(out(), manifest));
+  const VerifyResult result = verify_and_measure_asset(out());
+  EXPECT_FALSE(result.is_sound());
+  ASSERT_EQ(result.findings.size(), 1u);
+  EXPECT_EQ(result.findings[0].file, coarser.file);
+  EXPECT_NE(result.findings[0].message.find("its morph from the next finer level takes"), std::string::npos)
+      << result.findings[0].message;
 }
 
 TEST_F(Bake, NeverReplacesWhatIsNotABakedAsset) {

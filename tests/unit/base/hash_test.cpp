@@ -5,7 +5,9 @@
 
 #include <vector>
 
+#include "base/file_io.h"
 #include "base/random.h"
+#include "tests/support/files.h"
 
 namespace farfield {
 namespace {
@@ -38,6 +40,19 @@ TEST(Rng, IsUniformAndRepeatable) {
   }
   EXPECT_NEAR(sum / 100000, 0.5, 4 * 0.2887 / 316.2);  // 4 standard errors of the mean of 1e5 uniforms
   EXPECT_LT(equal, 10);
+}
+
+TEST(HashFile, OfPiecesIsThatOfTheWhole) {
+  const test::TemporaryFolder folder;
+  for (const size_t size : {0, 1, 16383, 16384, 16385, 100000}) {
+    std::vector<std::byte> bytes(size);
+    for (size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::byte>(mix64(i));
+    test::write_bytes(folder.path() / "file", bytes);
+    const auto hash = hash_file(folder.path() / "file");
+    ASSERT_TRUE(hash) << hash.error().message;
+    EXPECT_EQ(*hash, hash_bytes(bytes)) << size;
+  }
+  EXPECT_FALSE(hash_file(folder.path() / "missing"));
 }
 
 }  // namespace

@@ -45,19 +45,44 @@ TEST(VerifyAsset, HoldsWhatLevelsTakeAgainstTheManifest) {
   const TemporaryFolder folder;
   const Manifest manifest = test::write_sample_asset(folder.path());
   const auto with_factor = [&](double factor) {
-    return verify_asset(folder.path(), [&, i = size_t{0}](const LevelView&) mutable -> Result<LevelCost> {
+    const auto measure = [&, i = size_t{0}](const LevelView&) mutable -> Result<LevelCost> {
       const LevelEntry& entry = manifest.levels[i++];
       const auto times = [&](uint64_t bytes) { return static_cast<uint64_t>(factor * static_cast<double>(bytes)); };
       return LevelCost{times(entry.resident_bytes), times(entry.build_peak_bytes)};
-    });
+    };
+    return verify_asset(folder.path(), {measure, {}});
   };
   EXPECT_TRUE(with_factor(1.0).findings.empty()) << text_of(with_factor(1.0));
   EXPECT_TRUE(with_factor(1.2).is_sound());
   EXPECT_EQ(with_factor(1.2).findings.size(), 3u);
   expect_error(with_factor(1.7), "more while it is loaded; the manifest says");
-  expect_error(verify_asset(folder.path(),
-                            [](const LevelView&) -> Result<LevelCost> { return make_error(ErrorCode::Io, "no luck"); }),
-               "it cannot be loaded: no luck");
+  const auto fails = [](const LevelView&) -> Result<LevelCost> { return make_error(ErrorCode::Io, "no luck"); };
+  expect_error(verify_asset(folder.path(), {fails, {}}), "it cannot be loaded: no luck");
+}
+
+TEST(VerifyAsset, HoldsWhatMorphsTakeAgainstTheManifest) {
+  const TemporaryFolder folder;
+  Manifest manifest = test::write_sample_asset(folder.path());
+  manifest.levels[1].morph = LevelCost{3000, 600};  // from level 0; none was measured from level 1
+  ASSERT_TRUE(write_manifest(folder.path(), manifest));
+  const auto with = [&](const Result<LevelCost>& cost) {
+    return verify_asset(folder.path(), {{}, [&](const LevelView& fine, const LevelView& coarse) {
+                                          EXPECT_EQ(fine.header.level, manifest.levels[0].level);
+                                          EXPECT_EQ(coarse.header.level, manifest.levels[1].level);
+                                          return cost;
+                                        }});
+  };
+  EXPECT_TRUE(with(LevelCost{3000, 600}).findings.empty()) << text_of(with(LevelCost{3000, 600}));
+  const VerifyResult other = with(LevelCost{3100, 600});
+  EXPECT_TRUE(other.is_sound());
+  ASSERT_EQ(other.findings.size(), 1u);
+  EXPECT_EQ(other.findings[0].file, manifest.levels[1].file);
+  expect_error(with(LevelCost{6000, 600}),
+               manifest.levels[1].file +
+                   ": its morph from the next finer level takes 6000 bytes, and 600 more while it "
+                   "is loaded; the manifest says 3000 and 600; bake the asset again");
+  expect_error(with(make_error(ErrorCode::Io, "no luck")),
+               "its morph from the next finer level cannot be loaded: no luck");
 }
 
 TEST(VerifyAsset, FindsEveryFigureOfTheManifestThatTheFilesContradict) {
