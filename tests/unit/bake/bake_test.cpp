@@ -95,11 +95,11 @@ ImportedAsset ball_in_leaves() {
   return test::asset_of(surface, 77);
 }
 
-/// 24 sheets of 1 x 24 with gaps of 0.06, of 24 quads each.
-ImportedAsset boards() {
+/// 24 sheets of 1 x 24 with gaps, of 24 quads each.
+ImportedAsset boards(float gap = 0.06f) {
   Surface surface;
   for (uint32_t board = 0; board < 24; ++board) {
-    const Surface sheet = test::make_plane(1, 24, 0.94f, 24.0f);
+    const Surface sheet = test::make_plane(1, 24, 1 - gap, 24.0f);
     const auto first = static_cast<uint32_t>(surface.positions.size());
     for (const vec3& p : sheet.positions) surface.positions.push_back(p + vec3(board, 0, 0));
     for (const uvec3& t : sheet.triangles) surface.triangles.push_back(t + first);
@@ -442,6 +442,17 @@ TEST_F(Bake, OfBoardsWithNarrowGapsStaysASurface) {
     EXPECT_TRUE(level->view().has_surface());
     EXPECT_FALSE(level->view().has_volume());
   }
+}
+
+TEST_F(Bake, OfBoardsApartIsASheetWithGaps) {
+  const auto report = bake(boards(0.5f), "boards.obj", out(), small_options());
+  ASSERT_TRUE(report) << report.error().message;
+  const auto levels = open_levels(out());
+  ASSERT_GT(levels.size(), 1u);
+  const LevelView& root = levels.back()->view();
+  EXPECT_FALSE(root.has_volume());
+  ASSERT_EQ(root.face_sheet_shape.size(), face_count(root));
+  EXPECT_EQ(root.face_gap.size(), face_count(root));
 }
 
 TEST_F(Bake, OfTheSourceOnlyHasNoOtherLevel) {
