@@ -27,12 +27,14 @@ constexpr double kMostThickness2 = 0.0625;  ///< along the normal of what counts
 constexpr double kLeastExtent2 = 0.3;       ///< along both other axes of what is no ribbon and no rim
 constexpr double kDisc = 1.2;               ///< radius of the disc that rays look at
 constexpr uint32_t kRays = 64;
-constexpr double kLeastCovered = 0.8;                   ///< share of them that a closed wall must stop
-constexpr double kLeastAlignment = 0.85;                ///< mean cosine between what stops them and the layer's normal
-constexpr double kLeastSheetCovered = 0.1;              ///< the same of walls that are half open
-constexpr double kLeastSheetAlignment = 0.72;           ///< wires have 0.79, leaves at all angles 0.67
-constexpr size_t kLeastSheetCells = 32;                 ///< that such a wall reaches through
-constexpr double kLeastEven = 0.9, kEven = 0.125;       ///< share of its cells that cover what its median does, so near
+constexpr double kLeastCovered = 0.8;              ///< share of them that a closed wall must stop
+constexpr double kLeastAlignment = 0.85;           ///< mean cosine between what stops them and the layer's normal
+constexpr double kLeastSheetCovered = 0.1;         ///< the same of walls that are half open
+constexpr double kLeastSheetAlignment = 0.72;      ///< wires have 0.79, leaves at all angles 0.67
+constexpr size_t kLeastSheetCells = 32;            ///< that such a wall reaches through
+constexpr double kSmallDisc = 0.5;                 ///< radius of one that gaps between pieces should not be as wide as
+constexpr double kLeastInSmallDisc = 0.5;          ///< what it covers against the median
+constexpr double kLeastEven = 0.9, kEven = 0.125;  ///< share of its cells that cover what its median does, so near
 constexpr double kSameNormal = 0.9, kSamePlane = 0.35;  ///< cosine, distance: of neighbours in one wall
 constexpr double kMostTransmission = 0.02;              ///< mean albedo of what stops them
 constexpr double kNearPlane = 0.75, kNearMiddle = 2.0;  ///< what a layer's middle answers for
@@ -109,9 +111,10 @@ class MomentGrid {
 
 /// What rays along the layer's normal, from either side, see of it.
 struct LayerSeen {
-  double covered = 0;       ///< share of the rays that is stopped
-  double alignment = 0;     ///< mean cosine between what stops them and the normal
-  double transmission = 0;  ///< mean albedo
+  double covered = 0;         ///< share of the rays that is stopped
+  double alignment = 0;       ///< mean cosine between what stops them and the normal
+  double transmission = 0;    ///< mean albedo
+  double covered_nearby = 0;  ///< of parts of sheets: within kSmallDisc
 
   bool is_closed() const { return covered >= kLeastCovered && alignment >= kLeastAlignment && is_opaque(); }
   bool is_part_of_sheet() const {
@@ -120,12 +123,12 @@ struct LayerSeen {
   bool is_opaque() const { return transmission <= kMostTransmission; }
 };
 
-LayerSeen look_at(const OpacityScene& scene, const Layer& layer, double resolution, uint64_t seed) {
-  SplitMix random(seed);
+/// By rays at a disc around the layer's middle.
+LayerSeen look_at(const OpacityScene& scene, const Layer& layer, double resolution, double disc, SplitMix& random) {
   const BasicFrame<double> frame(layer.normal);
   double stopped = 0, cosines = 0, transmission = 0;
   for (uint32_t i = 0; i < kRays; ++i) {
-    const double radius = kDisc * std::sqrt(random.next_unit()), turn = 2 * M_PI * random.next_unit();
+    const double radius = disc * std::sqrt(random.next_unit()), turn = 2 * M_PI * random.next_unit();
     const double side = i % 2 == 0 ? 1 : -1;
     const dvec3 start = layer.middle + frame.to_world({radius * std::cos(turn), radius * std::sin(turn), side});
     const auto hit = scene.first_stop(vec3(start * resolution), vec3(-side * layer.normal),
@@ -139,6 +142,15 @@ LayerSeen look_at(const OpacityScene& scene, const Layer& layer, double resoluti
   }
   if (!(stopped > 0)) return {};
   return {stopped / kRays, cosines / stopped, transmission / stopped};
+}
+
+LayerSeen look_at(const OpacityScene& scene, const Layer& layer, double resolution, uint64_t seed) {
+  SplitMix random(seed);
+  LayerSeen seen = look_at(scene, layer, resolution, kDisc, random);
+  if (seen.is_part_of_sheet()) {
+    seen.covered_nearby = look_at(scene, layer, resolution, kSmallDisc, random).covered;
+  }
+  return seen;
 }
 
 /// Layers that go on from cell to cell, as numbers of their first cells. What is no part of a sheet is alone.
@@ -171,26 +183,31 @@ std::vector<uint32_t> connect(const std::vector<LayerCell>& cells, const std::ve
   return first;
 }
 
-/// Whether cells that cover these shares are a half-open wall. Planks, wires and holes are as open everywhere; scales,
-/// feathers and leaves that happen to lie in a layer are not (docs/decisions/0031).
-bool is_half_open(std::vector<double> covered) {
-  if (covered.size() < kLeastSheetCells) return false;
+/// Whether these cells are a half-open wall. Planks, wires and holes are as open everywhere; scales, feathers and
+/// leaves that happen to lie in a layer are not, nor are ropes that are farther from one another than a resolution
+/// (docs/decisions/0031).
+bool is_half_open(const std::vector<const LayerSeen*>& cells) {
+  if (cells.size() < kLeastSheetCells) return false;
+  std::vector<double> covered;
+  for (const LayerSeen* cell : cells) covered.push_back(cell->covered);
   const auto middle = covered.begin() + static_cast<ptrdiff_t>(covered.size() / 2);
   std::ranges::nth_element(covered, middle);
   const auto count = static_cast<double>(covered.size());
   const double median = *middle, mean = std::accumulate(covered.begin(), covered.end(), 0.0) / count;
-  const auto even = std::ranges::count_if(covered, [&](double c) { return std::abs(c - median) <= kEven; });
+  const auto even = std::ranges::count_if(cells, [&](const LayerSeen* cell) {
+    return std::abs(cell->covered - median) <= kEven && cell->covered_nearby >= kLeastInSmallDisc * median;
+  });
   return mean < kLeastCovered && static_cast<double>(even) >= kLeastEven * count;
 }
 
 /// Per layer: whether it belongs to a half-open wall.
 std::vector<uint8_t> find_sheets(const std::vector<LayerCell>& cells, const std::vector<LayerSeen>& seen) {
   const std::vector<uint32_t> first = connect(cells, seen);
-  std::vector<std::vector<double>> covered(cells.size());
-  for (size_t i = 0; i < cells.size(); ++i) covered[first[i]].push_back(seen[i].covered);
+  std::vector<std::vector<const LayerSeen*>> parts(cells.size());
+  for (size_t i = 0; i < cells.size(); ++i) parts[first[i]].push_back(&seen[i]);
   std::vector<uint8_t> is_sheet(cells.size(), 0);
   for (size_t i = 0; i < cells.size(); ++i) {
-    is_sheet[i] = first[i] == i ? is_half_open(std::move(covered[i])) : is_sheet[first[i]];
+    is_sheet[i] = first[i] == i ? is_half_open(parts[i]) : is_sheet[first[i]];
   }
   return is_sheet;
 }

@@ -125,7 +125,7 @@ TEST(PackedAnisotropy, IsWithinItsStepAndItsBounds) {
 }
 
 TEST(LevelView, ShowsEveryArrayOfItsLevel) {
-  LevelData level = test::full_level_of_version_4();
+  LevelData level = test::full_level_of_version_7();
   level.voxel_albedo = test::full_level_of_version_6().voxel_albedo;  // which no valid level has beside flakes
   level.voxel_anisotropy = test::full_level_of_version_6().voxel_anisotropy;
   const LevelView view = view_of(level);
@@ -154,7 +154,7 @@ TEST(SectionName, IsDifferentForEachSection) {
   std::set<std::string_view> names;
   const LevelView view;
   for_each_section(view, [&](SectionId id, const auto&) { names.insert(section_name(id)); });
-  EXPECT_EQ(names.size(), 31u);
+  EXPECT_EQ(names.size(), 32u);
   EXPECT_FALSE(names.contains(section_name(SectionId{0})));
 }
 
