@@ -351,11 +351,12 @@ class Baker {
     return order;
   }
 
-  /// Takes the surface around the last level's walls away. Pieces stay in wall_ where it still is macrosurface.
+  /// Takes the surface around the last level's walls away. Pieces stay in wall_ where it still is macrosurface;
+  /// half-open walls must be found again.
   void unwrap_walls(double resolution, std::vector<uint8_t>& is_macrosurface) {
+    append(std::exchange(sheet_, {}), sub_resolution_);
     if (is_shell_.empty()) {  // there are none, or no level was worth wrapping them
       append(std::exchange(wall_, {}), sub_resolution_);
-      append(std::exchange(sheet_, {}), sub_resolution_);
       return;
     }
     std::vector<uint8_t> is_wall_still = is_macrosurface, is_other = is_shell_, is_other_macrosurface;
@@ -364,10 +365,8 @@ class Baker {
       is_other[f] = !is_shell_[f];
       if (is_other[f]) is_other_macrosurface.push_back(is_macrosurface[f]);
     }
-    for (Surface* pieces : {&wall_, &sheet_}) {
-      const auto stays = find_near(*pieces, surface_, is_wall_still, 0.5 * resolution);
-      *pieces = compact(split(*pieces, stays, sub_resolution_).macrosurface);
-    }
+    const auto stays = find_near(wall_, surface_, is_wall_still, 0.5 * resolution);
+    wall_ = compact(split(wall_, stays, sub_resolution_).macrosurface);
     Surface shell;
     SplitSurface parts = split(surface_, is_other, shell);
     surface_ = std::move(parts.macrosurface);

@@ -19,7 +19,8 @@ SymMat3 in_plane(const SymMat3& s, const vec3& n) {
 /// At most a million fronts: along the sheet there are sides alone.
 float sides_towards(const SymMat3& s, const vec3& n, const vec3& w) {
   constexpr float kMost = 1e6f;
-  return std::min(sheet_areas(s, n, w).sides, kMost);
+  const float sides = sheet_areas(s, n, w).sides;
+  return sides < kMost ? sides : kMost;  // of broken files, too
 }
 
 }  // namespace
