@@ -34,6 +34,7 @@
 #include "prefilter/macrosurface.h"
 #include "prefilter/place_lattice.h"
 #include "prefilter/resolve.h"
+#include "prefilter/sheet_surface.h"
 #include "prefilter/simplify.h"
 #include "prefilter/voxelize.h"
 #include "prefilter/wall_shell.h"
@@ -192,9 +193,11 @@ uint64_t least_bytes(const VolumeSize& volume, const Surface& voxelized, const S
 }
 
 /// Less than what a level takes whose walls are wrapped.
-uint64_t least_shell_bytes(const Surface& wall, double resolution) {
-  constexpr uint64_t kTriangle = 20, kTrianglesPerVoxel = 8;  // front and back at edges of half a voxel: up to 18
-  return kTriangle * kTrianglesPerVoxel * mark_voxels(wall, {dvec3(0.0), resolution}).size();
+uint64_t least_shell_bytes(const Surface& wall, const Surface& sheet, double resolution) {
+  constexpr uint64_t kTriangle = 20;
+  constexpr uint64_t kOfWall = 8, kOfSheet = 2;  // per voxel; front and back at edges of half a voxel: up to 18
+  const auto voxels = [&](const Surface& pieces) { return mark_voxels(pieces, {dvec3(0.0), resolution}).size(); };
+  return kTriangle * (kOfWall * voxels(wall) + kOfSheet * voxels(sheet));
 }
 
 /// One bake, step by step.
@@ -348,8 +351,10 @@ class Baker {
     return order;
   }
 
-  /// Takes the surface around the last level's walls away. Pieces stay in wall_ where it still is macrosurface.
+  /// Takes the surface around the last level's walls away. Pieces stay in wall_ where it still is macrosurface;
+  /// half-open walls must be found again.
   void unwrap_walls(double resolution, std::vector<uint8_t>& is_macrosurface) {
+    append(std::exchange(sheet_, {}), sub_resolution_);
     if (is_shell_.empty()) {  // there are none, or no level was worth wrapping them
       append(std::exchange(wall_, {}), sub_resolution_);
       return;
@@ -361,8 +366,8 @@ class Baker {
       if (is_other[f]) is_other_macrosurface.push_back(is_macrosurface[f]);
     }
     const auto stays = find_near(wall_, surface_, is_wall_still, 0.5 * resolution);
-    Surface shell;
     wall_ = compact(split(wall_, stays, sub_resolution_).macrosurface);
+    Surface shell;
     SplitSurface parts = split(surface_, is_other, shell);
     surface_ = std::move(parts.macrosurface);
     compose(from_stored_.face, parts.macro_face);
@@ -373,24 +378,42 @@ class Baker {
   /// Wraps what looks like a wall at this resolution or did before. Levels are wrapped afresh, as volumes are made
   /// afresh.
   Result<void> wrap_walls(uint32_t level, double resolution, Surface& macrosurface, LevelReport& level_report) {
-    FARFIELD_TRY_LET(auto is_wall, find_walls(sub_resolution_, resolution));
-    if (std::ranges::find(is_wall, 1) != is_wall.end()) {
-      for (uint8_t& is : is_wall) is = !is;
-      sub_resolution_ = compact(split(sub_resolution_, is_wall, wall_).macrosurface);
-    }
-    if (wall_.triangles.empty()) return {};
+    FARFIELD_TRY_LET(const auto kinds, find_walls(sub_resolution_, resolution));
+    move_pieces(kinds);
+    if (wall_.triangles.empty() && sheet_.triangles.empty()) return {};
     level_report.worthless =
-        level != last_level_ && least_shell_bytes(wall_, resolution) > most_bytes_worth_writing(level);
+        level != last_level_ && least_shell_bytes(wall_, sheet_, resolution) > most_bytes_worth_writing(level);
     if (level_report.worthless) return {};
-    FARFIELD_TRY_LET(const Surface shell, wrap_wall(wall_, resolution));
-    if (shell.triangles.empty()) append(std::exchange(wall_, {}), sub_resolution_);
+    FARFIELD_TRY(wrap(wall_, resolution, wrap_wall, macrosurface));
+    return wrap(sheet_, resolution, lay_sheet, macrosurface);
+  }
+
+  /// What is of walls leaves sub_resolution_.
+  void move_pieces(const std::vector<WallKind>& kinds) {
+    if (std::ranges::all_of(kinds, [](WallKind kind) { return kind == WallKind::None; })) return;
+    Surface pieces;
+    std::vector<uint8_t> is_none, is_closed;
+    for (const WallKind kind : kinds) {
+      is_none.push_back(kind == WallKind::None);
+      if (kind != WallKind::None) is_closed.push_back(kind == WallKind::Closed);
+    }
+    sub_resolution_ = compact(split(sub_resolution_, is_none, pieces).macrosurface);
+    append(compact(split(pieces, is_closed, sheet_).macrosurface), wall_);
+  }
+
+  /// Adds the surface around these pieces; where there is none to be seen they become sub-resolution geometry again.
+  template <typename Wrap>
+  Result<void> wrap(Surface& pieces, double resolution, const Wrap& wrapped, Surface& macrosurface) {
+    if (pieces.triangles.empty()) return {};
+    FARFIELD_TRY_LET(const Surface shell, wrapped(pieces, resolution));
+    if (shell.triangles.empty()) append(std::exchange(pieces, {}), sub_resolution_);
     append(shell, macrosurface);
     return {};
   }
 
   /// Which faces of surface_ came from `first_shell_face` or later.
   void note_shell(size_t first_shell_face, const SimplifyResult& simplified, const SurfaceOrder& order) {
-    if (wall_.triangles.empty() || first_shell_face == simplified.face_map.size()) return;
+    if ((wall_.triangles.empty() && sheet_.triangles.empty()) || first_shell_face == simplified.face_map.size()) return;
     is_shell_.assign(surface_.triangles.size(), 0);
     for (size_t f = first_shell_face; f < simplified.face_map.size(); ++f) {
       if (simplified.face_map[f] != kMorphCollapsed) is_shell_[order.face_number[simplified.face_map[f]]] = 1;
@@ -487,8 +510,9 @@ class Baker {
   std::vector<double> texel_areas_;
   bool is_resolved_ = false;       ///< from then on surface_ is there
   Surface surface_;                ///< of the level at hand, in final order
-  Surface sub_resolution_;         ///< all that has left the surface so far, but for wall_
+  Surface sub_resolution_;         ///< all that has left the surface so far, but for wall_ and sheet_
   Surface wall_;                   ///< pieces of the walls that are wrapped at the level at hand
+  Surface sheet_;                  ///< pieces of the half-open ones that are laid as sheets
   std::vector<uint8_t> is_shell_;  ///< faces of surface_ that are such walls
   MorphMaps from_stored_;          ///< from the last written level to surface_
   dvec3 middle_{0.0};              ///< of the source's bounds

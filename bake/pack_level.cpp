@@ -246,6 +246,9 @@ void pack_surface(const Surface& surface, const SurfaceOrder& order, LevelData& 
   drop_if_all(level.face_emission, PackedRadiance{});
   level.face_gap = pack_each<uint8_t>(materials, [](const auto& m) { return pack_unorm8(m.gap); });
   drop_if_all(level.face_gap, uint8_t{0});
+  level.face_sheet_shape =
+      pack_each<PackedSheetShape>(materials, [](const auto& m) { return pack_sheet_shape(m.sheet); });
+  drop_if_all(level.face_sheet_shape, PackedSheetShape{});
   if (!level.face_specular.empty()) {
     level.face_roughness2 = pack_each<uint8_t>(materials, [](const auto& m) { return pack_unorm8(m.roughness2); });
   }

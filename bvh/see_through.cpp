@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "base/hash.h"
+#include "cache/level_values.h"
 
 namespace farfield {
 
@@ -17,6 +18,12 @@ float path_number(const RayContext& context, const EmbreeRay& ray, float cell, u
 
 float ray_number(const RayContext& context, const EmbreeRay& ray, uint32_t face) {
   return to_unit_float(mix64(mix64(context.ray_seed, face), std::bit_cast<uint32_t>(ray.tfar)));
+}
+
+float gap_along(const LevelView& level, uint32_t face, const EmbreeRay& ray, const EmbreeHit& hit) {
+  if (level.face_gap.empty() || level.face_gap[face] == 0) return 0;
+  const vec3 normal(hit.Ng_x, hit.Ng_y, hit.Ng_z);
+  return gap_towards(level, face, glm::normalize(normal), vec3(ray.dir_x, ray.dir_y, ray.dir_z));
 }
 
 float opacity_at(const TracedLevel& level, const RayContext& context, const EmbreeRay& ray, uint32_t quad,
@@ -37,7 +44,7 @@ void opacity_filter(const EmbreeFilterArguments* args) {
   const auto& ray = *reinterpret_cast<const EmbreeRay*>(args->ray);
   const auto& hit = *reinterpret_cast<const EmbreeHit*>(args->hit);
   const uint32_t face = level.face_of(hit.primID, quad_side(hit.u, hit.v));
-  const float gap = gap_of(level.view, face);
+  const float gap = gap_along(level.view, face, ray, hit);
   if (gap > 0 && path_number(context, ray, kGapCell * level.view.header.resolution, 0) < gap) {
     args->valid[0] = 0;
     return;

@@ -21,10 +21,8 @@ float ray_number(const RayContext& context, const EmbreeRay& ray, uint32_t face)
 /// The side of the cubes in which a path sees gaps alike, in resolutions.
 inline constexpr float kGapCell = 4;
 
-/// The share of a face that is gaps between the pieces it stands for.
-inline float gap_of(const LevelView& level, uint32_t face) {
-  return level.face_gap.empty() ? 0.0f : unpack_unorm8(level.face_gap[face]);
-}
+/// The share of a face that is gaps between the pieces it stands for, along a ray that hits it.
+float gap_along(const LevelView& level, uint32_t face, const EmbreeRay& ray, const EmbreeHit& hit);
 /// The share of rays that the rest of a face stops at a hit.
 float opacity_at(const TracedLevel& level, const RayContext& context, const EmbreeRay& ray, uint32_t quad,
                  uint32_t face, const vec2& barycentric);

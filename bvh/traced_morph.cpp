@@ -273,8 +273,8 @@ bool TracedMorph::stops(const EmbreeFilterArguments& args) const {
   const uint32_t face = level.face_of(element / 2, element % 2);
   const uint32_t target = fades ? kMorphVoxelized : coarse_face_[face];
   const bool becomes_face = target < coarse_->face_count;
-  float gap = gap_of(level.view, face);
-  if (becomes_face) gap = mix(gap, gap_of(coarse_->view, target), t);
+  float gap = gap_along(level.view, face, ray, hit);
+  if (becomes_face) gap = mix(gap, gap_along(coarse_->view, target, ray, hit), t);
   if (gap > 0 && path_number(context, ray, kGapCell * level.view.header.resolution, 0) < gap) return false;
 
   float opacity = opacity_at(level, context, ray, element / 2, face, barycentric);

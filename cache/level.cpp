@@ -46,6 +46,15 @@ PackedColor pack_color(const vec3& linear_rgb) {
   return packed;
 }
 
+PackedSheetShape pack_sheet_shape(const SheetShape& shape) {
+  if (!shape.is_sheet()) return {};
+  return {to_unorm8(shape.edge), std::max(to_unorm8(shape.order), uint8_t{1}), to_unorm8(shape.caught)};
+}
+
+SheetShape unpack_sheet_shape(PackedSheetShape shape) {
+  return {unpack_unorm8(shape.edge), unpack_unorm8(shape.order), unpack_unorm8(shape.caught)};
+}
+
 vec3 unpack_color(PackedColor color) {
   const vec3 root(unpack_unorm8(color.sqrt_rgb[0]), unpack_unorm8(color.sqrt_rgb[1]), unpack_unorm8(color.sqrt_rgb[2]));
   return root * root;

@@ -14,6 +14,7 @@
 #include "base/vec.h"
 #include "cache/octants.h"
 #include "scattering/sggx_codec.h"
+#include "scattering/sheet.h"
 
 namespace farfield {
 
@@ -42,6 +43,14 @@ struct PackedVertexColor {
 };
 PackedVertexColor pack_vertex_color(const vec4& linear_rgba);
 vec4 unpack_vertex_color(PackedVertexColor color);
+
+/// A SheetShape (scattering/sheet.h), each number as unorm8. No sheet: order 0.
+struct PackedSheetShape {
+  uint8_t edge = 0, order = 0, caught = 0;
+  friend bool operator==(const PackedSheetShape&, const PackedSheetShape&) = default;
+};
+PackedSheetShape pack_sheet_shape(const SheetShape& shape);
+SheetShape unpack_sheet_shape(PackedSheetShape shape);
 
 /// Radiance from 1e-30 to 1e30, linear RGB: three mantissas and an exponent that they share, 0.4 % of the largest
 /// channel [Ward 1991].
@@ -195,7 +204,9 @@ inline size_t brick_table_index(const ivec3& dims, const ivec3& brick) {
   ARRAY(29, VoxelOctants,       voxel_octants,        PackedOctants,     Voxels)        /* shares of density; full */ \
   /* media that scatter by themselves */                                                                              \
   ARRAY(30, VoxelAlbedo,        voxel_albedo,         PackedAlbedo,      Voxels)        /* of fog; the header's */   \
-  ARRAY(31, VoxelAnisotropy,    voxel_anisotropy,     int8_t,            Voxels)        /* of all that a voxel of fog scatters; the header's, of what is scattered once */
+  ARRAY(31, VoxelAnisotropy,    voxel_anisotropy,     int8_t,            Voxels)        /* of all that a voxel of fog scatters; the header's, of what is scattered once */ \
+  /* sheets with gaps */                                                                                              \
+  ARRAY(32, FaceSheetShape,     face_sheet_shape,     PackedSheetShape,  Faces)         /* no sheet */
 // clang-format on
 
 /// The arrays, owned (Array = std::vector<T>) while baking, or as spans into a file in memory at run time.

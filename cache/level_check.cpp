@@ -138,6 +138,7 @@ Problem check_surface(const LevelView& level) {
   if (level.face_specular.size() != level.face_roughness2.size()) {
     return "face_specular and face_roughness2 do not go together";
   }
+  if (!level.face_sheet_shape.empty() && level.face_gap.empty()) return "face_sheet_shape needs face_gap";
   if (Problem problem = check_shading_vertices(level)) return problem;
   return check_lengths(level, SectionGroup::Faces, "faces", face_count(level));
 }

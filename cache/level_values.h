@@ -36,6 +36,25 @@ inline SurfaceParams face_params(const LevelView& level, uint32_t face) {
   return params;
 }
 
+/// How the pieces lie that a face stands for.
+inline SheetShape sheet_shape(const LevelView& level, uint32_t face) {
+  return level.face_sheet_shape.empty() ? SheetShape{} : unpack_sheet_shape(level.face_sheet_shape[face]);
+}
+
+/// The share of a face that is gaps between the pieces it stands for; of a sheet, along its normal.
+inline float gap_of(const LevelView& level, uint32_t face) {
+  return level.face_gap.empty() ? 0.0f : unpack_unorm8(level.face_gap[face]);
+}
+
+/// The share of paths along `direction` that pass between these pieces. n: the face's unit normal; both in the asset's
+/// space, `direction` of any length.
+inline float gap_towards(const LevelView& level, uint32_t face, const vec3& n, const vec3& direction) {
+  const float gap = gap_of(level, face);
+  const SheetShape shape = sheet_shape(level, face);
+  if (!shape.is_sheet() || level.face_sggx.empty()) return gap;
+  return sheet_gap(shape, gap, sheet_areas(unpack(level.face_sggx[face]), n, direction));
+}
+
 /// Of a voxel of flakes, in the asset's space.
 inline FlakeParams flake_params(const LevelView& level, uint32_t voxel) {
   FlakeParams params;

@@ -12,7 +12,8 @@ FaceMaterial mix(const FaceMaterial& a, float factor_a, const FaceMaterial& b, f
   const auto mean = [&](auto FaceMaterial::*channel) { return a.*channel * factor_a + b.*channel * factor_b; };
   return {mean(&FaceMaterial::sggx),         mean(&FaceMaterial::diffuse),    mean(&FaceMaterial::specular),
           mean(&FaceMaterial::transmission), mean(&FaceMaterial::roughness2), mean(&FaceMaterial::shading_sggx),
-          mean(&FaceMaterial::opacity),      mean(&FaceMaterial::emission),   mean(&FaceMaterial::gap)};
+          mean(&FaceMaterial::opacity),      mean(&FaceMaterial::emission),   mean(&FaceMaterial::gap),
+          mean(&FaceMaterial::sheet)};
 }
 
 void filter_materials(std::span<const double> area_before, std::span<const double> area_after,

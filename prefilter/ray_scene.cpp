@@ -56,7 +56,9 @@ std::optional<RayHit> OpacityScene::first_stop(const vec3& origin, const vec3& d
   while (near <= far) {
     const auto hit = scene_.first_hit(origin, direction, near, far);
     if (!hit) return {};
-    const float opacity = geometry_->materials[hit->triangle].stopped_share();
+    const FaceMaterial& face = geometry_->materials[hit->triangle];
+    const float opacity =
+        face.sheet.is_sheet() ? face.stopped_share(glm::normalize(hit->normal), direction) : face.stopped_share();
     if (opacity >= 1 || to_unit_float(random.next()) < opacity) return hit;
     near = std::nextafter(hit->distance, std::numeric_limits<float>::infinity());
   }

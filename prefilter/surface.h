@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/vec.h"
+#include "scattering/sheet.h"
 #include "scattering/sym_mat3.h"
 
 namespace farfield {
@@ -22,15 +23,19 @@ struct FaceMaterial {
   SymMat3 shading_sggx;     ///< the same of shading normals; 0 on all faces of a surface that has no such normals
   float opacity = 1.0f;     ///< share of rays that the face stops
   vec3 emission{0.0f};      ///< linear radiance of both sides, >= 0, may exceed 1
-  float gap = 0.0f;         ///< share of paths that pass between the pieces that the face stands for
+  float gap = 0.0f;  ///< share of paths that pass between the pieces that the face stands for; of sheets, along n
+  SheetShape sheet;  ///< of these pieces, whose projected areas squared are sggx
 
   /// What light sees of the face's normals.
   const SymMat3& seen_normals() const { return shading_sggx.trace() > 0 ? shading_sggx : sggx; }
   /// The normals of the flakes that stand for the face. They make both the look of a volume and its attenuation along
   /// each direction: so they are those that light sees, but bent away from the face's own by no more than 30 degrees.
   SymMat3 flake_normals() const;
-  /// The share of rays that the face stops.
+  /// The share of rays that the face stops; of rays towards w at a face with unit normal n.
   float stopped_share() const { return opacity * (1 - gap); }
+  float stopped_share(const vec3& n, const vec3& w) const {
+    return sheet.is_sheet() ? opacity * (1 - sheet_gap(sheet, gap, sheet_areas(sggx, n, w))) : stopped_share();
+  }
 };
 
 /// A triangle soup or mesh with shared vertices. Winding may be inconsistent; faces are two-sided.

@@ -15,10 +15,8 @@
 #include "prefilter/material_filter.h"
 #include "prefilter/ray_scene.h"
 #include "prefilter/triangle_pieces.h"
-#include "prefilter/vertex_placement.h"
 #include "prefilter/voxel_marks.h"
-#include "scattering/albedo.h"
-#include "scattering/warp.h"
+#include "prefilter/wall_pieces.h"
 
 namespace farfield {
 namespace {
@@ -27,7 +25,6 @@ constexpr double kCell = 0.25;  ///< of the resolution: voxels, and the widest g
 constexpr uint32_t kRaysPerFace = 4;
 constexpr float kLeastCosine = 0.15f;  ///< rays that are flatter are cast at this angle
 constexpr float kLeastGap = 0.03f;     ///< share of rays through the wall below which it counts as tight
-constexpr float kEscapeLength = 1;     ///< in resolutions: how far light must get away
 
 /// Which voxels a set holds.
 class VoxelLookup {
@@ -85,84 +82,11 @@ class Boundary {
   std::unordered_map<uint64_t, uint32_t> vertex_of_;
 };
 
-/// The wall's triangles in pieces no longer than a voxel, by the voxel of their middle. In voxel units.
-class NearestPoint {
- public:
-  NearestPoint(const Surface& wall, const VoxelLattice& lattice) {
-    for (size_t face = 0; face < wall.triangles.size(); ++face) {
-      for_each_piece(
-          in_cells(corners_of(wall, face), lattice.origin, lattice.voxel_size), 1,
-          [&](const TrianglePiece& piece) { pieces_[cell_key(ivec3(glm::floor(middle_of(piece))))].push_back(piece); });
-    }
-    for_each_cell_around(ivec3(0), kReach, [&](const ivec3& offset) {
-      around_.push_back({offset, distance_to_voxel(offset)});
-    });
-    std::ranges::stable_sort(around_, {}, &Neighbour::distance);
-  }
-
-  /// The wall's nearest point to a corner of one of its voxels; the corner itself if there is none nearby.
-  dvec3 to(const ivec3& corner) const {
-    const dvec3 p(corner);
-    dvec3 nearest = p;
-    double distance = std::numeric_limits<double>::infinity();
-    for (const Neighbour& neighbour : around_) {
-      if (neighbour.distance - kMiddleToCorner > distance) break;
-      const auto found = pieces_.find(cell_key(corner + neighbour.offset));
-      if (found == pieces_.end()) continue;
-      for (const TrianglePiece& t : found->second) {
-        if (glm::length(middle_of(t) - p) - kMiddleToCorner > distance) continue;
-        const dvec3 weight = closest_barycentric(p, t[0], t[1], t[2]);
-        const dvec3 point = weight.x * t[0] + weight.y * t[1] + weight.z * t[2];
-        if (glm::length(point - p) < distance) distance = glm::length(point - p), nearest = point;
-      }
-    }
-    return nearest;
-  }
-
- private:
-  static constexpr int kReach = 3;                      ///< voxels: mark_voxels() also marks what it passes by
-  static constexpr double kMiddleToCorner = 2.0 / 3.0;  ///< of a piece whose edges are at most 1 long
-  struct Neighbour {
-    ivec3 offset;
-    double distance;
-  };
-
-  static double distance_to_voxel(const ivec3& offset) {
-    return glm::length(glm::max(glm::max(dvec3(offset), -dvec3(offset + 1)), dvec3(0)));
-  }
-
-  std::unordered_map<uint64_t, std::vector<TrianglePiece>> pieces_;
-  std::vector<Neighbour> around_;  ///< voxels around a corner, near ones first
-};
-
-/// The same triangles in pieces: rays find their way through long planks ten times as fast.
-Surface in_pieces(const Surface& wall, double longest) {
-  Surface result;
-  for (size_t face = 0; face < wall.triangles.size(); ++face) {
-    for_each_piece(corners_of(wall, face), longest, [&](const TrianglePiece& piece) {
-      const auto first = static_cast<uint32_t>(result.positions.size());
-      for (const dvec3& p : piece) result.positions.emplace_back(p);
-      result.triangles.emplace_back(first, first + 1, first + 2);
-      result.materials.push_back(wall.materials[face]);
-    });
-  }
-  return result;
-}
-
 /// What rays from outside see of the wall.
 struct Seen {
   FaceMaterial sum;
   float rays = 0, hits = 0, escaped = 0;
 };
-
-const FaceMaterial& no_material() {
-  static const FaceMaterial none = [] {
-    FaceMaterial m;
-    m.roughness2 = m.opacity = 0;
-    return m;
-  }();
-  return none;
-}
 
 /// The same spread of normals, but around this one. Steps of a tight wall that rise towards one side are many and their
 /// edges few, but all together they catch as much light as the plane through them: their main direction would be too
@@ -177,26 +101,22 @@ void turn_normals_to(const vec3& normal, FaceMaterial& m) {
   if (m.shading_sggx.trace() > 0) m.shading_sggx = around(normal, m.shading_sggx);
 }
 
-/// The mean of what was seen, without the light that stays between the pieces: of light that meets others of them, as
-/// much comes back as cluster_albedo() says where a share of `usual_escape` gets away at once. Linear in what a face's
-/// few rays say, so that their noise does no harm.
+/// The mean of what was seen, without the light that stays between the pieces.
 FaceMaterial mean_of(const Seen& seen, float usual_escape) {
   FaceMaterial m = mix(seen.sum, 1 / seen.hits, seen.sum, 0.0f);
   m.opacity = 1;
-  const float caught = 1 - seen.escaped / seen.hits;
-  const vec3 albedo = glm::min(layered_albedo(m.specular, m.diffuse + m.transmission), vec3(1.0f));
-  const vec3 absorbed = vec3(1.0f) - albedo;
-  const vec3 gain = vec3(1.0f) - caught * absorbed / glm::max(absorbed + albedo * usual_escape, vec3(1e-6f));
-  m.diffuse *= gain;
-  m.specular *= gain;
-  m.transmission *= gain;
+  const vec3 kept = kept_light(m, 1 - seen.escaped / seen.hits, usual_escape);
+  m.diffuse *= kept;
+  m.specular *= kept;
+  m.transmission *= kept;
   return m;
 }
 
 /// Looks at the wall from faces around it.
 class WallViewer {
  public:
-  WallViewer(const OpacityScene& wall, double resolution) : wall_(wall), resolution_(static_cast<float>(resolution)) {}
+  WallViewer(const OpacityScene& wall, double resolution)
+      : pieces_(wall, resolution), resolution_(static_cast<float>(resolution)) {}
 
   Seen look_at(const TrianglePiece& face, const vec3& outwards, uint64_t seed) const {
     Seen seen;
@@ -210,30 +130,18 @@ class WallViewer {
   void look(const TrianglePiece& face, const vec3& outwards, SplitMix& random, Seen& seen) const {
     const auto u = static_cast<float>(random.next_unit()), v = static_cast<float>(random.next_unit());
     const vec3 at = point_on(face, u, v);
-    const vec3 away = lobe(outwards, random);
+    const vec3 away = random_lobe(outwards, random);
     const float start = 0.5f * resolution_ / std::max(glm::dot(away, outwards), kLeastCosine);
     seen.rays += 1;
     const vec3 origin = at + start * away;
-    const auto hit = wall_.first_stop(origin, -away, 3 * start, random);
-    if (!hit) return;
-    const FaceMaterial& m = wall_.surface().materials[hit->triangle];
+    const auto look = pieces_.look(origin, -away, 3 * start, random);
+    if (!look) return;
     seen.hits += 1;
-    seen.sum = mix(seen.sum, 1, m, 1);
-    const float length = glm::length(hit->normal);
-    if (!(length > 0)) return;
-    const vec3 normal = hit->normal / length;
-    const vec3 on = lobe(glm::dot(normal, away) > 0 ? normal : -normal, random);
-    const vec3 point = origin - hit->distance * away;
-    const bool is_stopped = wall_.is_stopped(point, on, 1e-4f * resolution_, kEscapeLength * resolution_, random);
-    if (!is_stopped) seen.escaped += 1;
+    seen.sum = mix(seen.sum, 1, *look->material, 1);
+    if (look->escapes) seen.escaped += 1;
   }
 
-  static vec3 lobe(const vec3& normal, SplitMix& random) {
-    const float u1 = to_unit_float(random.next()), u2 = to_unit_float(random.next());
-    return cosine_lobe(normal, u1, u2);
-  }
-
-  const OpacityScene& wall_;
+  PieceViewer pieces_;
   float resolution_;
 };
 
@@ -243,10 +151,10 @@ class Shell {
  public:
   Shell(const Surface& wall, const VoxelLattice& lattice) {
     const Boundary boundary(mark_voxels(wall, lattice));
-    const NearestPoint nearest(wall, lattice);
+    const NearestPoint nearest(wall, lattice.origin, lattice.voxel_size);
     std::vector<dvec3> on_wall(boundary.corners.size());
     parallel_for(on_wall.size(), 256, [&](size_t begin, size_t end) {
-      for (size_t v = begin; v < end; ++v) on_wall[v] = nearest.to(boundary.corners[v]);
+      for (size_t v = begin; v < end; ++v) on_wall[v] = nearest.to(dvec3(boundary.corners[v]));
     });
     surface.origin = wall.origin;
     std::vector<uint32_t> vertex_of;

@@ -3,7 +3,9 @@
 // looked at by rays along its normal. Lengths are in resolutions but where rays are cast.
 #include "prefilter/walls.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <unordered_map>
 #include <unordered_set>
@@ -12,6 +14,7 @@
 #include "base/parallel.h"
 #include "base/split_mix.h"
 #include "prefilter/grid_cells.h"
+#include "prefilter/layers.h"
 #include "prefilter/ray_scene.h"
 #include "prefilter/triangle_pieces.h"
 #include "scattering/sggx.h"
@@ -24,69 +27,41 @@ constexpr double kMostThickness2 = 0.0625;  ///< along the normal of what counts
 constexpr double kLeastExtent2 = 0.3;       ///< along both other axes of what is no ribbon and no rim
 constexpr double kDisc = 1.2;               ///< radius of the disc that rays look at
 constexpr uint32_t kRays = 64;
-constexpr double kLeastCovered = 0.8;                   ///< share of them that must be stopped
-constexpr double kLeastAlignment = 0.85;                ///< mean cosine between what stops them and the layer's normal
+constexpr double kLeastCovered = 0.8;              ///< share of them that a closed wall must stop
+constexpr double kLeastAlignment = 0.85;           ///< mean cosine between what stops them and the layer's normal
+constexpr double kLeastSheetCovered = 0.1;         ///< the same of walls that are half open
+constexpr double kLeastSheetAlignment = 0.6;       ///< round wires have 0.79, chain links as little as leaves, 0.67
+constexpr size_t kLeastSheetCells = 32;            ///< that such a wall reaches through
+constexpr double kSmallDisc = 0.5;                 ///< radius of one that gaps between pieces should not be as wide as
+constexpr double kLeastInSmallDisc = 0.5;          ///< what it covers against the median
+constexpr double kLeastEven = 0.9, kEven = 0.125;  ///< share of its cells that cover what its median does, so near
+constexpr double kSameNormal = 0.9, kSamePlane = 0.35;  ///< cosine, distance: of neighbours in one wall
 constexpr double kMostTransmission = 0.02;              ///< mean albedo of what stops them
 constexpr double kNearPlane = 0.75, kNearMiddle = 2.0;  ///< what a layer's middle answers for
 constexpr int kNearCells = 3;                           ///< cells around it that reach so far
 
-/// Integrals over faces.
-struct Moments {
-  double area = 0;
-  dvec3 first{0.0};
-  glm::dmat3 second{0.0};
-
-  void add(const TrianglePiece& t) {
-    const double piece_area = 0.5 * glm::length(area_vector_of(t));
-    const dvec3 middle = middle_of(t);
-    area += piece_area;
-    first += piece_area * middle;
-    second += piece_area * 0.75 * glm::outerProduct(middle, middle);
-    for (const dvec3& p : t) second += piece_area / 12 * glm::outerProduct(p, p);
-  }
-  void add(const Moments& other) {
-    area += other.area;
-    first += other.first;
-    second += other.second;
-  }
-  dvec3 middle() const { return first / area; }
-  glm::dmat3 covariance() const { return second / area - glm::outerProduct(middle(), middle()); }
-};
-
-/// A place in the middle of a layer.
-struct Layer {
-  dvec3 middle, normal;
-
-  bool owns(const dvec3& point) const {
-    const dvec3 offset = point - middle;
-    const double height = glm::dot(offset, normal);
-    return std::abs(height) <= kNearPlane && glm::dot(offset, offset) - height * height <= kNearMiddle * kNearMiddle;
-  }
-};
-
-/// The unit eigenvector of an eigenvalue that no other is near.
-std::optional<dvec3> eigenvector(const glm::dmat3& m, double eigenvalue) {
-  const glm::dmat3 rest = m - glm::dmat3(eigenvalue);
-  dvec3 longest(0.0);
-  for (int i = 0; i < 3; ++i) {
-    const dvec3 candidate = glm::cross(rest[i], rest[(i + 1) % 3]);
-    if (glm::dot(candidate, candidate) > glm::dot(longest, longest)) longest = candidate;
-  }
-  const double length = glm::length(longest);
-  if (!(length > 0)) return {};
-  return longest / length;
+/// What this layer's middle answers for.
+bool owns(const Layer& layer, const dvec3& point) {
+  const dvec3 offset = point - layer.middle;
+  const double height = layer.height(point);
+  return std::abs(height) <= kNearPlane && glm::dot(offset, offset) - height * height <= kNearMiddle * kNearMiddle;
 }
 
-/// The layer that these moments are of, if they are of one.
+/// The layer that these moments are of, if they are of a thin one.
 std::optional<Layer> thin_layer(const Moments& moments) {
   if (!(moments.area > 0)) return {};
   const glm::dmat3 m = moments.covariance();
-  const dvec3 variance = eigenvalues(SymEntries{m[0][0], m[1][1], m[2][2], m[0][1], m[0][2], m[1][2]});
+  const dvec3 variance = eigenvalues_of(m);
   if (!(variance.y >= kLeastExtent2 && variance.z <= kMostThickness2)) return {};
   const auto normal = eigenvector(m, variance.z);
   if (!normal) return {};
   return Layer{moments.middle(), *normal};
 }
+
+struct LayerCell {
+  ivec3 cell;
+  Layer layer;
+};
 
 /// Moments of the geometry per cell.
 class MomentGrid {
@@ -102,13 +77,17 @@ class MomentGrid {
     }
   }
 
-  /// Cells in order of first use that lie in thin layers: these layers, and for the others nothing.
-  std::vector<std::optional<Layer>> find_layers() const {
+  /// The cells that lie in thin layers, in order of first use.
+  std::vector<LayerCell> find_layers() const {
     std::vector<std::optional<Layer>> layers(cells_.size());
     parallel_for(cells_.size(), 256, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) layers[i] = thin_layer(around(cells_[i].coordinate));
     });
-    return layers;
+    std::vector<LayerCell> result;
+    for (size_t i = 0; i < layers.size(); ++i) {
+      if (layers[i]) result.push_back({cells_[i].coordinate, *layers[i]});
+    }
+    return result;
   }
 
  private:
@@ -130,13 +109,26 @@ class MomentGrid {
   std::unordered_map<uint64_t, uint32_t> cell_of_;
 };
 
-/// Whether rays along the layer's normal, from either side, see a wall.
-bool looks_like_wall(const OpacityScene& scene, const Layer& layer, double resolution, uint64_t seed) {
-  SplitMix random(seed);
+/// What rays along the layer's normal, from either side, see of it.
+struct LayerSeen {
+  double covered = 0;         ///< share of the rays that is stopped
+  double alignment = 0;       ///< mean cosine between what stops them and the normal
+  double transmission = 0;    ///< mean albedo
+  double covered_nearby = 0;  ///< of parts of sheets: within kSmallDisc
+
+  bool is_closed() const { return covered >= kLeastCovered && alignment >= kLeastAlignment && is_opaque(); }
+  bool is_part_of_sheet() const {
+    return covered >= kLeastSheetCovered && alignment >= kLeastSheetAlignment && is_opaque();
+  }
+  bool is_opaque() const { return transmission <= kMostTransmission; }
+};
+
+/// By rays at a disc around the layer's middle.
+LayerSeen look_at(const OpacityScene& scene, const Layer& layer, double resolution, double disc, SplitMix& random) {
   const BasicFrame<double> frame(layer.normal);
   double stopped = 0, cosines = 0, transmission = 0;
   for (uint32_t i = 0; i < kRays; ++i) {
-    const double radius = kDisc * std::sqrt(random.next_unit()), turn = 2 * M_PI * random.next_unit();
+    const double radius = disc * std::sqrt(random.next_unit()), turn = 2 * M_PI * random.next_unit();
     const double side = i % 2 == 0 ? 1 : -1;
     const dvec3 start = layer.middle + frame.to_world({radius * std::cos(turn), radius * std::sin(turn), side});
     const auto hit = scene.first_stop(vec3(start * resolution), vec3(-side * layer.normal),
@@ -148,8 +140,76 @@ bool looks_like_wall(const OpacityScene& scene, const Layer& layer, double resol
     if (length > 0) cosines += std::abs(glm::dot(normal, layer.normal)) / length;
     transmission += component_sum(scene.surface().materials[hit->triangle].transmission) / 3;
   }
-  return stopped >= kLeastCovered * kRays && cosines >= kLeastAlignment * stopped &&
-         transmission <= kMostTransmission * stopped;
+  if (!(stopped > 0)) return {};
+  return {stopped / kRays, cosines / stopped, transmission / stopped};
+}
+
+LayerSeen look_at(const OpacityScene& scene, const Layer& layer, double resolution, uint64_t seed) {
+  SplitMix random(seed);
+  LayerSeen seen = look_at(scene, layer, resolution, kDisc, random);
+  if (seen.is_part_of_sheet()) {
+    seen.covered_nearby = look_at(scene, layer, resolution, kSmallDisc, random).covered;
+  }
+  return seen;
+}
+
+/// Layers that go on from cell to cell, as numbers of their first cells. What is no part of a sheet is alone.
+std::vector<uint32_t> connect(const std::vector<LayerCell>& cells, const std::vector<LayerSeen>& seen) {
+  std::vector<uint32_t> first(cells.size());
+  std::iota(first.begin(), first.end(), 0u);
+  const auto find = [&](uint32_t i) {
+    while (first[i] != i) i = first[i] = first[first[i]];
+    return i;
+  };
+  std::unordered_map<uint64_t, uint32_t> number;
+  for (uint32_t i = 0; i < cells.size(); ++i) {
+    if (seen[i].is_part_of_sheet()) number[cell_key(cells[i].cell)] = i;
+  }
+  for (uint32_t i = 0; i < cells.size(); ++i) {
+    if (!seen[i].is_part_of_sheet()) continue;
+    const Layer& a = cells[i].layer;
+    for_each_cell_around(cells[i].cell, 1, [&](const ivec3& cell) {
+      const auto found = number.find(cell_key(cell));
+      if (found == number.end()) return;
+      const Layer& b = cells[found->second].layer;
+      const bool goes_on = std::abs(glm::dot(a.normal, b.normal)) >= kSameNormal &&
+                           std::abs(a.height(b.middle)) <= kSamePlane && std::abs(b.height(a.middle)) <= kSamePlane;
+      if (!goes_on) return;
+      const uint32_t one = find(i), other = find(found->second);
+      first[std::max(one, other)] = std::min(one, other);
+    });
+  }
+  for (uint32_t i = 0; i < first.size(); ++i) first[i] = find(i);
+  return first;
+}
+
+/// Whether these cells are a half-open wall. Planks, wires and holes are as open everywhere; scales, feathers and
+/// leaves that happen to lie in a layer are not, nor are ropes that are farther from one another than a resolution
+/// (docs/decisions/0031).
+bool is_half_open(const std::vector<const LayerSeen*>& cells) {
+  if (cells.size() < kLeastSheetCells) return false;
+  std::vector<double> covered;
+  for (const LayerSeen* cell : cells) covered.push_back(cell->covered);
+  const auto middle = covered.begin() + static_cast<ptrdiff_t>(covered.size() / 2);
+  std::ranges::nth_element(covered, middle);
+  const auto count = static_cast<double>(covered.size());
+  const double median = *middle, mean = std::accumulate(covered.begin(), covered.end(), 0.0) / count;
+  const auto even = std::ranges::count_if(cells, [&](const LayerSeen* cell) {
+    return std::abs(cell->covered - median) <= kEven && cell->covered_nearby >= kLeastInSmallDisc * median;
+  });
+  return mean < kLeastCovered && static_cast<double>(even) >= kLeastEven * count;
+}
+
+/// Per layer: whether it belongs to a half-open wall.
+std::vector<uint8_t> find_sheets(const std::vector<LayerCell>& cells, const std::vector<LayerSeen>& seen) {
+  const std::vector<uint32_t> first = connect(cells, seen);
+  std::vector<std::vector<const LayerSeen*>> parts(cells.size());
+  for (size_t i = 0; i < cells.size(); ++i) parts[first[i]].push_back(&seen[i]);
+  std::vector<uint8_t> is_sheet(cells.size(), 0);
+  for (size_t i = 0; i < cells.size(); ++i) {
+    is_sheet[i] = first[i] == i ? is_half_open(parts[i]) : is_sheet[first[i]];
+  }
+  return is_sheet;
 }
 
 /// Layers by the cells around them that they may answer for.
@@ -166,7 +226,7 @@ class LayerGrid {
     const auto found = near_.find(cell_key(ivec3(glm::floor(point))));
     if (found == near_.end()) return false;
     for (const uint32_t i : found->second) {
-      if (layers_[i].owns(point)) return true;
+      if (farfield::owns(layers_[i], point)) return true;
     }
     return false;
   }
@@ -196,28 +256,36 @@ std::vector<uint8_t> faces_mostly_in(const Surface& geometry, double unit, const
 
 }  // namespace
 
-Result<std::vector<uint8_t>> find_walls(const Surface& geometry, double resolution) {
-  std::vector<uint8_t> is_wall(geometry.triangles.size(), 0);
-  const auto candidates = MomentGrid(geometry, resolution).find_layers();
-  std::vector<Layer> layers;
-  for (const auto& layer : candidates) {
-    if (layer) layers.push_back(*layer);
-  }
-  if (layers.empty()) return is_wall;
+Result<std::vector<WallKind>> find_walls(const Surface& geometry, double resolution) {
+  std::vector<WallKind> kinds(geometry.triangles.size(), WallKind::None);
+  const std::vector<LayerCell> cells = MomentGrid(geometry, resolution).find_layers();
+  if (cells.empty()) return kinds;
 
   FARFIELD_TRY_LET(const auto scene, OpacityScene::build(geometry));
-  std::vector<uint8_t> is_seen(layers.size(), 0);
-  parallel_for(layers.size(), 16, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) is_seen[i] = looks_like_wall(scene, layers[i], resolution, mix64(i));
+  std::vector<LayerSeen> seen(cells.size());
+  parallel_for(cells.size(), 16, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) seen[i] = look_at(scene, cells[i].layer, resolution, mix64(i));
   });
-  std::vector<Layer> walls;
-  for (size_t i = 0; i < layers.size(); ++i) {
-    if (is_seen[i]) walls.push_back(layers[i]);
+  const std::vector<uint8_t> is_sheet = find_sheets(cells, seen);
+  std::vector<Layer> closed, sheets;
+  for (size_t i = 0; i < cells.size(); ++i) {
+    if (is_sheet[i]) {
+      sheets.push_back(cells[i].layer);
+    } else if (seen[i].is_closed()) {
+      closed.push_back(cells[i].layer);
+    }
   }
-  if (walls.empty()) return is_wall;
-
-  const LayerGrid grid(std::move(walls));
-  return faces_mostly_in(geometry, resolution, [&](const dvec3& point) { return grid.owns(point); });
+  const auto mark = [&](std::vector<Layer> layers, WallKind kind) {
+    if (layers.empty()) return;
+    const LayerGrid grid(std::move(layers));
+    const auto is_owned = faces_mostly_in(geometry, resolution, [&](const dvec3& point) { return grid.owns(point); });
+    for (size_t f = 0; f < kinds.size(); ++f) {
+      if (is_owned[f]) kinds[f] = kind;
+    }
+  };
+  mark(std::move(sheets), WallKind::HalfOpen);
+  mark(std::move(closed), WallKind::Closed);  // has the last say
+  return kinds;
 }
 
 std::vector<uint8_t> find_near(const Surface& geometry, const Surface& surface, const std::vector<uint8_t>& is_marked,

@@ -10,15 +10,23 @@
 
 namespace farfield {
 
-/// Per face: 1 where it is part of a wall at `resolution` (scene units, > 0).
+enum class WallKind : uint8_t {
+  None,
+  Closed,    ///< with gaps that are small against the pieces
+  HalfOpen,  ///< planks apart, slats, wires: a sheet that lets many rays through
+};
+
+/// Per face: whether it is part of a wall at `resolution` (scene units, > 0).
 ///
 /// A place is wall if all geometry within about 1.5 resolutions of it lies in a layer that is thin against the
 /// resolution, covers most of a disc there when looked at along the layer's normal, mostly with faces that lie in the
-/// layer's plane, and lets no light through. So foliage is none: its leaves lie at all angles, or leave holes. Faces of
-/// whose area most lies close to such places are of the wall.
+/// layer's plane, and lets no light through. So foliage is none: its leaves lie at all angles, or leave holes. What
+/// covers less is a wall, half open, if such places go on into one another for some six resolutions both ways and are
+/// all open alike, which leaves, scales and feathers are not. Faces of whose area most lies close to such places are of
+/// the wall.
 ///
 /// Deterministic for any thread count. Errors: those of OpacityScene::build().
-Result<std::vector<uint8_t>> find_walls(const Surface& geometry, double resolution);
+Result<std::vector<WallKind>> find_walls(const Surface& geometry, double resolution);
 
 /// Per face of `geometry`: 1 where most of its area is within about `distance` (> 0) of faces of `surface` that are
 /// marked in `is_marked`. Deterministic for any thread count.

@@ -178,13 +178,23 @@ SurfaceParams blended(const SurfaceParams& a, const SurfaceParams& b, float t) {
   return mixed;
 }
 
-/// How the surface reflects at a hit, with its geometric normal known; sets the shading normal and what it emits.
-SurfaceParams shade_surface(const HitLevels& levels, const InstanceRecord& instance, const HitRecord& hit,
-                            const vec3& world_direction, Interaction& interaction) {
+/// How a face reflects at a hit.
+struct FaceShading {
+  SurfaceParams params;
+  SheetShape sheet;  ///< of pieces
+  float gap;
+  SymMat3 pieces;  ///< whose projected areas squared, in world space, are these
+};
+
+/// With the geometric normal known; sets the shading normal and what the face emits.
+FaceShading shade_surface(const HitLevels& levels, const InstanceRecord& instance, const HitRecord& hit,
+                          const vec3& world_direction, Interaction& interaction) {
   const TracedLevel& level = *levels.level;
   const LevelView& view = level.view;
   const uint32_t quad = hit.element / 2, face = level.face_of(quad, hit.element % 2);
   SurfaceParams params = face_params(view, face);
+  SheetShape sheet = sheet_shape(view, face);
+  float gap = gap_of(view, face);
   interaction.emission = emission_at(view.face_emission, face);
   vec3 normal = interaction.geometric_normal;
   std::optional<SymMat3> normals = face_normals(view, face, instance);
@@ -202,17 +212,36 @@ SurfaceParams shade_surface(const HitLevels& levels, const InstanceRecord& insta
       normals = blended(normals.value_or(SymMat3::outer(normal)),
                         of_target.value_or(SymMat3::outer(interaction.geometric_normal)), hit.blend);
       params = blended(params, face_params(coarse.view, target), hit.blend);
+      const SheetShape sheet_of_target = sheet_shape(coarse.view, target);
+      if (sheet.is_sheet() && sheet_of_target.is_sheet()) {
+        sheet = blended(sheet, sheet_of_target, hit.blend);
+        gap = blended(gap, gap_of(coarse.view, target), hit.blend);
+      }
       interaction.emission = blended(interaction.emission, emission_at(coarse.view.face_emission, target), hit.blend);
     }
   }
+  if (normals) set_sggx(interaction.reflectance, *normals);
+  if (sheet.is_sheet()) {  // what faces where is for its pieces to say
+    interaction.shading_normal = interaction.geometric_normal;
+    return {params, sheet, gap, normals.value_or(SymMat3::outer(normal))};
+  }
   if (normals) {
-    set_sggx(interaction.reflectance, *normals);
     const MainNormal main = main_normal(*normals, normal);
     normal = main.normal;
     params.roughness2 = std::min(params.roughness2 + main.roughness2, 1.0f);
   }
   interaction.shading_normal = visible_normal(normal, interaction.geometric_normal, interaction.wo);
-  return params;
+  return {params, {}, 0, {}};
+}
+
+FlakeParams flakes_of(const FaceShading& face) {
+  FlakeParams flakes;
+  flakes.sggx = face.pieces;
+  flakes.diffuse = face.params.diffuse;
+  flakes.specular = face.params.specular;
+  flakes.transmission = face.params.transmission;
+  flakes.roughness2 = face.params.roughness2;
+  return flakes;
 }
 
 /// Light does not go through a surface because its two normals disagree about its sides.
@@ -263,13 +292,21 @@ Interaction make_interaction(const HitLevels& levels, const InstanceRecord& inst
   const vec3 normal_local(hit.normal_local[0], hit.normal_local[1], hit.normal_local[2]);
   const vec3 normal = glm::normalize(instance.normal_to_world(glm::normalize(normal_local)));
   interaction.geometric_normal = glm::dot(normal, interaction.wo) < 0.0f ? -normal : normal;
-  const SurfaceParams params = shade_surface(levels, instance, hit, direction, interaction);
+  const FaceShading shading = shade_surface(levels, instance, hit, direction, interaction);
+  const SurfaceParams& params = shading.params;
   set_reflectance(interaction.reflectance, params);
   interaction.albedo = layered_albedo(params.specular, params.diffuse + params.transmission);
-  InteractionModel::put(interaction,
-                        InteractionModel(SurfaceBsdf(params, interaction.shading_normal, interaction.wo),
-                                         HorizonLobe(params, interaction.shading_normal, interaction.geometric_normal),
-                                         ray_offset(instance, origin, interaction.position, view.header.bounds)));
+  const float offset = ray_offset(instance, origin, interaction.position, view.header.bounds);
+  if (shading.sheet.is_sheet()) {
+    const SheetPhase phase(flakes_of(shading), shading.sheet, shading.gap, interaction.geometric_normal,
+                           interaction.wo);
+    InteractionModel::put(interaction, InteractionModel(phase, offset));
+    return interaction;
+  }
+  InteractionModel::put(
+      interaction,
+      InteractionModel(SurfaceBsdf(params, interaction.shading_normal, interaction.wo),
+                       HorizonLobe(params, interaction.shading_normal, interaction.geometric_normal), offset));
   return interaction;
 }
 
@@ -282,7 +319,7 @@ vec3 Interaction::ray_origin(const vec3& wi) const {
 ScatterSample Interaction::sample(Rng& rng) const {
   if (kind == Kind::None) return {};
   const InteractionModel& model = InteractionModel::of(*this);
-  if (kind == Kind::Volume) return model.with_phase([&](const auto& phase) { return phase.sample(rng); });
+  if (model.has_phase()) return model.with_phase([&](const auto& phase) { return phase.sample(rng); });
   const HorizonLobe& horizon = model.horizon;
   if (!(horizon.chance > 0)) return model.surface.sample(rng);
   ScatterSample sample;
@@ -301,7 +338,7 @@ ScatterSample Interaction::sample(Rng& rng) const {
 glm::vec3 Interaction::eval(const glm::vec3& wi, Rng& rng) const {
   if (kind == Kind::None) return vec3(0.0f);
   const InteractionModel& model = InteractionModel::of(*this);
-  if (kind == Kind::Volume) return model.with_phase([&](const auto& phase) { return phase.eval(wi, rng); });
+  if (model.has_phase()) return model.with_phase([&](const auto& phase) { return phase.eval(wi, rng); });
   const vec3 value = is_on_one_side(*this, wi) ? model.surface.eval(wi) : vec3(0.0f);
   return model.horizon.chance > 0 ? value + model.horizon.eval(wi) : value;
 }
@@ -309,7 +346,7 @@ glm::vec3 Interaction::eval(const glm::vec3& wi, Rng& rng) const {
 float Interaction::pdf(const glm::vec3& wi) const {
   if (kind == Kind::None) return 0.0f;
   const InteractionModel& model = InteractionModel::of(*this);
-  if (kind == Kind::Volume) return model.with_phase([&](const auto& phase) { return phase.pdf(wi); });
+  if (model.has_phase()) return model.with_phase([&](const auto& phase) { return phase.pdf(wi); });
   const float chance = model.horizon.chance;
   const float density = (1 - chance) * model.surface.pdf(wi);
   return chance > 0 ? density + chance * model.horizon.pdf(wi) : density;

@@ -9,6 +9,7 @@
 #include "scattering/flake_phase.h"
 #include "scattering/fog_phase.h"
 #include "scattering/horizon_lobe.h"
+#include "scattering/sheet_phase.h"
 #include "scattering/surface_bsdf.h"
 
 namespace farfield {
@@ -32,23 +33,28 @@ namespace detail {
 /// Lies in Interaction::model_. Trivially copyable, as interactions are copied byte by byte.
 struct InteractionModel {
   union {
-    SurfaceBsdf surface;  ///< Kind::Surface
-    FlakePhase flakes;    ///< Kind::Volume, of flakes
-    FogPhase fog;         ///< Kind::Volume, of fog
+    SurfaceBsdf surface;
+    SheetPhase sheet;
+    FlakePhase flakes;
+    FogPhase fog;
   };
-  HorizonLobe horizon;  ///< Kind::Surface
-  bool is_fog = false;  ///< which of the two, in volumes
+  enum class Of : uint8_t { Surface, Sheet, Flakes, Fog };  ///< the first two are Kind::Surface
+  Of of_what;
+  HorizonLobe horizon;  ///< of a surface
   float offset = 0;     ///< how far off the surface rays start, world units
 
   InteractionModel(const SurfaceBsdf& bsdf, const HorizonLobe& lobe, float ray_offset)
-      : surface(bsdf), horizon(lobe), offset(ray_offset) {}
-  explicit InteractionModel(const FlakePhase& phase) : flakes(phase) {}
-  explicit InteractionModel(const FogPhase& phase) : fog(phase), is_fog(true) {}
+      : surface(bsdf), of_what(Of::Surface), horizon(lobe), offset(ray_offset) {}
+  InteractionModel(const SheetPhase& phase, float ray_offset) : sheet(phase), of_what(Of::Sheet), offset(ray_offset) {}
+  explicit InteractionModel(const FlakePhase& phase) : flakes(phase), of_what(Of::Flakes) {}
+  explicit InteractionModel(const FogPhase& phase) : fog(phase), of_what(Of::Fog) {}
 
-  /// Of Kind::Volume: use(its phase function).
+  bool has_phase() const { return of_what != Of::Surface; }
+  /// Where it has one: use(its phase function).
   template <typename Use>
   auto with_phase(const Use& use) const {
-    return is_fog ? use(fog) : use(flakes);
+    if (of_what == Of::Sheet) return use(sheet);
+    return of_what == Of::Fog ? use(fog) : use(flakes);
   }
 
   static const InteractionModel& of(const Interaction& interaction);

@@ -10,6 +10,9 @@ conifer.obj  a tree of needles: clumps of clumps, no leaf as wide as a voxel.
 shingles.obj a ridge roof of shingles that overlap, of uneven widths (docs/decisions/0014).
 slats.obj    sheets without thickness, with gaps of 4 %, in a slanted plane.
 barrel.obj   a round wall of staves, with gaps of 3 %.
+pickets.obj  boards apart in a slanted plane, with gaps of 60 %.
+netting.obj  round wires of two directions that pass each other, on a cylinder (docs/decisions/0031).
+holes.obj    a sheet without thickness, with square holes.
 """
 import math
 import random
@@ -143,6 +146,44 @@ def barrel():
     return mesh
 
 
+def pickets():
+    """80 boards of 0.1 x 0.05 with gaps of 0.15, which lean."""
+    mesh = Mesh()
+    for i in range(80):
+        first = len(mesh.points) + 1
+        for k in range(8):
+            along, up, out = 0.25 * i + 0.1 * (k & 1), 8 * (k >> 1 & 1), 0.05 * (k >> 2 & 1)
+            mesh.points.append([0.9 * along - 0.3 * out, up + 0.3 * along, 0.4 * along + 0.5 * up + out])
+        for face in ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)):
+            mesh.faces.append([first + i for i in face])
+    return mesh
+
+
+def netting():
+    """Wires 0.05 wide, 0.2 apart, around a quarter of a cylinder."""
+    mesh, radius = Mesh(), 12.0
+    at = lambda turn, height, out: ((radius + out) * math.cos(turn), height, (radius + out) * math.sin(turn))
+    for i in range(60):
+        for k in range(36):
+            mesh.tube(at(math.pi / 2 * k / 36, 0.2 * i, 0.03), at(math.pi / 2 * (k + 1) / 36, 0.2 * i, 0.03), 0.025, 8)
+    for i in range(95):
+        mesh.tube(at(math.pi / 2 * i / 95, 0, -0.03), at(math.pi / 2 * i / 95, 12, -0.03), 0.025, 8)
+    return mesh
+
+
+def holes():
+    """40 x 30 holes of 0.6 at distances of 1."""
+    mesh = Mesh()
+    sheet = lambda x, y, w, h: ((x, y), (x + w, y), (x + w, y + h), (x, y + h))
+    for i in range(40):
+        for k in range(30):
+            for corners in (sheet(i, k, 1, 0.4), sheet(i, k + 0.4, 0.4, 0.6)):
+                first = len(mesh.points) + 1
+                mesh.points += [[x, y, 0.3 * x] for x, y in corners]
+                mesh.faces.append([first + c for c in range(4)])
+    return mesh
+
+
 def conifer(seed=3):
     mesh, rng = Mesh(), random.Random(seed)
     mesh.tube((0, 0, 0), (0, 10, 0), 0.12, 8)
@@ -169,7 +210,7 @@ def conifer(seed=3):
 def main():
     out = Path(sys.argv[1])
     out.mkdir(parents=True, exist_ok=True)
-    for make in (rigging, planks, conifer, shingles, slats, barrel):
+    for make in (rigging, planks, conifer, shingles, slats, barrel, pickets, netting, holes):
         make().write(out / (make.__name__ + ".obj"))
 
 

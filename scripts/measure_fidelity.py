@@ -38,8 +38,8 @@ SHARED_ASSETS = ["trees/small_maple.obj.gz*", "trees/small_maple_cards.glb*", "t
                  "gltf-import/glTF-Transform/ShapeCollection.glb",
                  "gltf-import/tinygltf/CubeImageUriSpaces/CubeImageUriSpaces.gltf",
                  "gltf-import/tinygltf/SparseMorphTargets-issue280/singleBlendshapeCube_sparse.glb"]
-# Of the generated ones, those that were looked at while walls were made (decision 0014).
-LOOKED_AT = ["tiles", "feathers"]
+# Of the generated ones, those that were looked at while walls were made (decisions 0014 and 0031).
+LOOKED_AT = ["tiles", "feathers", "planks_50", "fence", "ropes"]
 LEFT_OUT = [("nasty/, tinygltf/BoundsChecking and tinygltf/regression", "broken on purpose or without faces; tests read them"),
             ("import-cases/", "a few triangles per trait of exporters; tests read them"),
             ("glTF-Transform/BoxDraco, BoxMeshopt, DenseSphere, DracoSparseMesh",

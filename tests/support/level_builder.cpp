@@ -276,6 +276,12 @@ LevelData full_level_of_version_5() {
   return level;
 }
 
+LevelData full_level_of_version_7() {
+  LevelData level = full_level_of_version_4();
+  level.face_sheet_shape = {{0, 0, 0}, {255, 128, 7}, {12, 1, 200}};
+  return level;
+}
+
 LevelData full_level_of_version_6() {
   LevelData level = full_level_of_version_2();
   for (auto* flakes : {&level.voxel_diffuse, &level.voxel_specular, &level.voxel_transmission}) flakes->clear();

@@ -68,6 +68,8 @@ LevelData full_level_of_version_5();
 
 /// The same with fog instead of flakes, and all that only fog has.
 LevelData full_level_of_version_6();
+/// Version 4 with what version 7 added: shapes of sheets.
+LevelData full_level_of_version_7();
 
 /// A random sound level: `quads` quads, `bricks` bricks, channels picked by the seed.
 LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks);

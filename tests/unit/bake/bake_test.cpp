@@ -96,11 +96,11 @@ ImportedAsset ball_in_leaves() {
   return test::asset_of(surface, 77);
 }
 
-/// 24 sheets of 1 x 24 with gaps of 0.06, of 24 quads each.
-ImportedAsset boards() {
+/// 24 sheets of 1 x 24 with gaps, of 24 quads each.
+ImportedAsset boards(float gap = 0.06f) {
   Surface surface;
   for (uint32_t board = 0; board < 24; ++board) {
-    const Surface sheet = test::make_plane(1, 24, 0.94f, 24.0f);
+    const Surface sheet = test::make_plane(1, 24, 1 - gap, 24.0f);
     const auto first = static_cast<uint32_t>(surface.positions.size());
     for (const vec3& p : sheet.positions) surface.positions.push_back(p + vec3(board, 0, 0));
     for (const uvec3& t : sheet.triangles) surface.triangles.push_back(t + first);
@@ -443,6 +443,25 @@ TEST_F(Bake, OfBoardsWithNarrowGapsStaysASurface) {
     EXPECT_TRUE(level->view().has_surface());
     EXPECT_FALSE(level->view().has_volume());
   }
+}
+
+TEST_F(Bake, OfBoardsApartIsASheetWithGaps) {
+  BakeOptions options = small_options();
+  options.finest_grid = 16;
+  options.measure_resident = [](const LevelView& level) {  // all levels pay
+    return Result<LevelCost>(LevelCost{uint64_t{1000000} >> level.header.level, 1});
+  };
+  const auto report = bake(boards(0.5f), "boards.obj", out(), options);
+  ASSERT_TRUE(report) << report.error().message;
+  const auto levels = open_levels(out());
+  ASSERT_EQ(levels.size(), 4u);
+  for (const size_t grid_16_or_8 : {1u, 2u}) {
+    const LevelView& sheet = levels[grid_16_or_8]->view();
+    EXPECT_FALSE(sheet.has_volume());
+    EXPECT_EQ(sheet.face_sheet_shape.size(), face_count(sheet));
+    EXPECT_EQ(sheet.face_gap.size(), face_count(sheet));
+  }
+  EXPECT_TRUE(levels[3]->view().has_volume());  // so few voxels are no wall
 }
 
 TEST_F(Bake, OfTheSourceOnlyHasNoOtherLevel) {

@@ -88,6 +88,30 @@ TEST_F(GapWall, OtherPlacesHaveOtherGaps) {
   EXPECT_NEAR(differ / 1000.0, 2 * kGap / 255.0 * (1 - kGap / 255.0), 0.08);
 }
 
+/// Planks as deep as wide, along y: what a ray across sees of them has the width of both.
+TEST_F(GapWall, OfPlanksIsTheMoreClosedTheFlatterItIsLookedAt) {
+  const float gap = 128 / 255.0f;
+  level_.face_gap.assign(4, 128);
+  level_.face_sheet_shape.assign(4, {255, 255, 0});
+  level_.face_sggx.assign(4, pack_surface_sggx({1, 0, 1, 0, 0, 0}));
+  view_ = view_of(level_);
+  view_.positions = view_.positions.first(level_.positions.size() - 1);
+  traced_ = TracedLevel::build(*device_, view_, 0).value();
+  constexpr int kPaths = 20000;
+  for (const vec3& across : {vec3(0.5f, 0, -1), vec3(0, 0.5f, -1), vec3(2, 0, -1)}) {
+    int passed = 0;
+    for (uint32_t path = 0; path < kPaths; ++path) {
+      RayContext context;
+      context.path_seed = path;
+      EmbreeRayHit ray = make_ray_hit(vec3(50, 30, 0.2f) - across, across, 0, 1.05f);  // at the upper quad
+      passed += !trace_nearest(traced_->scene.handle(), context.embree, ray);
+    }
+    const float covered = std::min((1 - gap) * (1 + std::abs(across.x)), 1.0f);
+    const double sigma = std::sqrt(covered * (1 - covered) / kPaths);
+    EXPECT_NEAR(double(passed) / kPaths, 1 - covered, 5 * sigma + 1e-3) << across.x;
+  }
+}
+
 TEST_F(GapWall, FacesWithoutGapsStopEverything) {
   level_.face_gap.assign(4, 0);
   for (uint32_t path = 0; path < 1000; ++path) EXPECT_TRUE(look_down(50, 30, path, 7));

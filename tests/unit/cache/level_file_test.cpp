@@ -223,6 +223,16 @@ TEST(LevelFormat, GoldenBytesOfVersion6AreFrozen) {
   expect_frozen("/format_v6/level_3.ffl", 3840u, test::full_level_of_version_6());
 }
 
+TEST(LevelFormat, GoldenBytesOfVersion7AreFrozen) {
+  expect_frozen("/format_v7/level_3.ffl", 4480u, test::full_level_of_version_7());
+}
+
+TEST(LevelFormat, ShapesOfSheetsNeedGaps) {
+  LevelData level = test::full_level_of_version_7();
+  level.face_gap.clear();
+  EXPECT_EQ(find_structure_problem(view_of(level)).value_or(""), "face_sheet_shape needs face_gap");
+}
+
 TEST(LevelFormat, FogHasNothingOfFlakesAndFlakesNothingOfFog) {
   const auto problem = [](const std::function<void(LevelData&)>& spoil) {
     LevelData level = test::full_level_of_version_6();
@@ -381,7 +391,7 @@ TEST(HostileLevelFile, HeaderAndTableFieldsAreChecked) {
   const std::vector<Case> cases = {
       {"does not start as a level file", [](auto& h, auto*) { h.magic[1] = 'X'; }},
       {"the format version is 0", [](auto& h, auto*) { h.version = 0; }},
-      {"level format 7, and this Farfield reads up to 6", [](auto& h, auto*) { h.version = 7; },
+      {"level format 8, and this Farfield reads up to 7", [](auto& h, auto*) { h.version = 8; },
        ErrorCode::Unsupported},
       {"the header says", [](auto& h, auto*) { h.file_bytes = kHuge; }},
       {"sections leaves the file", [](auto& h, auto*) { h.section_count = 0xffffffffu; }},

@@ -48,6 +48,18 @@ TEST(PackUnorm8, RoundsClampsAndTakesNanForZero) {
   EXPECT_EQ(pack_unorm8(kNan), 0);
 }
 
+TEST(PackSheetShape, KeepsSheetsSheets) {
+  for (const float order : {1e-6f, 0.3f, 1.0f}) {
+    const SheetShape back = unpack_sheet_shape(pack_sheet_shape({0.25f, order, 0.75f}));
+    EXPECT_TRUE(back.is_sheet());
+    EXPECT_NEAR(back.order, order, 1.0f / 255);
+    EXPECT_NEAR(back.edge, 0.25f, 0.5f / 255 + 1e-6f);
+    EXPECT_NEAR(back.caught, 0.75f, 0.5f / 255 + 1e-6f);
+  }
+  EXPECT_FALSE(unpack_sheet_shape(pack_sheet_shape({1, 0, 1})).is_sheet());
+  EXPECT_FALSE(unpack_sheet_shape(pack_sheet_shape({1, kNan, 1})).is_sheet());
+}
+
 TEST(PackRadiance, KeepsTheLargestChannelToHalfAPercent) {
   EXPECT_EQ(unpack_radiance(pack_radiance(vec3(0.0f))), vec3(0.0f));
   EXPECT_EQ(unpack_radiance(pack_radiance(vec3(-1.0f, kNan, 0.0f))), vec3(0.0f));
@@ -113,7 +125,7 @@ TEST(PackedAnisotropy, IsWithinItsStepAndItsBounds) {
 }
 
 TEST(LevelView, ShowsEveryArrayOfItsLevel) {
-  LevelData level = test::full_level_of_version_4();
+  LevelData level = test::full_level_of_version_7();
   level.voxel_albedo = test::full_level_of_version_6().voxel_albedo;  // which no valid level has beside flakes
   level.voxel_anisotropy = test::full_level_of_version_6().voxel_anisotropy;
   const LevelView view = view_of(level);
@@ -142,7 +154,7 @@ TEST(SectionName, IsDifferentForEachSection) {
   std::set<std::string_view> names;
   const LevelView view;
   for_each_section(view, [&](SectionId id, const auto&) { names.insert(section_name(id)); });
-  EXPECT_EQ(names.size(), 31u);
+  EXPECT_EQ(names.size(), 32u);
   EXPECT_FALSE(names.contains(section_name(SectionId{0})));
 }
 

@@ -13,7 +13,7 @@ FaceMaterial random_material(std::mt19937& rng) {
   std::uniform_real_distribution<float> u;
   const auto color = [&] { return vec3(u(rng), u(rng), u(rng)); };
   const auto matrix = [&] { return SymMat3{u(rng), u(rng), u(rng), u(rng), u(rng), u(rng)}; };
-  return {matrix(), color(), color(), color(), u(rng), matrix(), u(rng), color()};
+  return {matrix(), color(), color(), color(), u(rng), matrix(), u(rng), color(), u(rng), {u(rng), u(rng), u(rng)}};
 }
 
 FaceMaterial mean_material(const std::vector<double>& area, const std::vector<FaceMaterial>& materials) {
@@ -31,6 +31,10 @@ void expect_near(const FaceMaterial& a, const FaceMaterial& b, float tolerance) 
     EXPECT_NEAR(a.transmission[c], b.transmission[c], tolerance);
   }
   EXPECT_NEAR(a.roughness2, b.roughness2, tolerance);
+  EXPECT_NEAR(a.gap, b.gap, tolerance);
+  EXPECT_NEAR(a.sheet.edge, b.sheet.edge, tolerance);
+  EXPECT_NEAR(a.sheet.order, b.sheet.order, tolerance);
+  EXPECT_NEAR(a.sheet.caught, b.sheet.caught, tolerance);
   EXPECT_NEAR(a.sggx.xx, b.sggx.xx, tolerance);
   EXPECT_NEAR(a.sggx.yy, b.sggx.yy, tolerance);
   EXPECT_NEAR(a.sggx.zz, b.sggx.zz, tolerance);

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/parallel.h"
+#include "base/random.h"
 #include "prefilter/triangle_pieces.h"
 #include "prefilter/wall_shell.h"
 #include "tests/support/ray_scenes.h"
@@ -16,6 +17,19 @@ namespace farfield {
 namespace {
 
 using namespace test;
+
+double part_of(WallKind kind, const Surface& surface, double resolution) {
+  const auto kinds = find_walls(surface, resolution);
+  EXPECT_TRUE(kinds);
+  EXPECT_EQ(kinds->size(), surface.triangles.size());
+  return static_cast<double>(std::ranges::count(*kinds, kind)) / static_cast<double>(kinds->size());
+}
+/// Of closed walls.
+double wall_part(const Surface& surface, double resolution) { return part_of(WallKind::Closed, surface, resolution); }
+/// Of half-open ones.
+double sheet_part(const Surface& surface, double resolution) {
+  return part_of(WallKind::HalfOpen, surface, resolution);
+}
 
 void add_quad(Surface& surface, const vec3& a, const vec3& b, const vec3& c, const vec3& d) {
   const auto first = static_cast<uint32_t>(surface.positions.size());
@@ -43,13 +57,6 @@ Surface make_boards(float gap) {
   return boards;
 }
 
-double wall_part(const Surface& surface, double resolution) {
-  const auto is_wall = find_walls(surface, resolution);
-  EXPECT_TRUE(is_wall);
-  EXPECT_EQ(is_wall->size(), surface.triangles.size());
-  return static_cast<double>(std::count(is_wall->begin(), is_wall->end(), 1)) / static_cast<double>(is_wall->size());
-}
-
 double area_of(const Surface& surface) {
   double area = 0;
   for (size_t f = 0; f < surface.triangles.size(); ++f)
@@ -59,7 +66,10 @@ double area_of(const Surface& surface) {
 
 TEST(Walls, BoardsAreOneWhereTheirGapsAreNarrow) {
   for (const float gap : {0.0f, 0.02f, 0.1f}) EXPECT_EQ(wall_part(make_boards(gap), 2), 1.0) << gap;
-  for (const float gap : {0.3f, 0.5f}) EXPECT_EQ(wall_part(make_boards(gap), 2), 0.0) << gap;
+  for (const float gap : {0.3f, 0.5f, 0.8f}) {
+    EXPECT_EQ(wall_part(make_boards(gap), 2), 0.0) << gap;
+    EXPECT_EQ(sheet_part(make_boards(gap), 2), 1.0) << gap;
+  }
 }
 
 TEST(Walls, BoardsAreNoneWhereTheyAreThickOrFew) {
@@ -72,6 +82,24 @@ TEST(Walls, OneBoardIsNone) {
   add_box(board, vec3(0), {1, 20, 0.2f});
   add_materials(board);
   EXPECT_EQ(wall_part(board, 2), 0.0);
+}
+
+TEST(Walls, AFewVoxelsAreNoHalfOpenOne) {
+  EXPECT_EQ(sheet_part(make_boards(0.5f), 8), 0.0);  // 2.5 resolutions wide
+  Surface fence = make_boards(0.5f);
+  for (vec3& p : fence.positions) p.y *= 0.1f;  // one resolution high
+  EXPECT_EQ(sheet_part(fence, 2), 0.0);
+}
+
+TEST(Walls, ScalesThatHideTheirGapsInPlacesAreNoHalfOpenOnes) {
+  Surface scales;
+  Rng rng(4);
+  for (int i = 0; i < 900; ++i) {  // strewn in a plane: as much is covered as by boards, but unevenly
+    const float x = 20 * rng.next(), y = 20 * rng.next();
+    add_quad(scales, {x, y, 0}, {x + 1, y, 0}, {x + 1, y + 0.5f, 0.05f}, {x, y + 0.5f, 0.05f});
+  }
+  add_materials(scales);
+  EXPECT_EQ(sheet_part(scales, 1), 0.0);
 }
 
 TEST(Walls, ASlantedRoofOfSingleSheetsIsOne) {
@@ -94,9 +122,11 @@ TEST(Walls, LeavesAndNeedlesAreNone) {
   LeafCloud cloud;
   cloud.count = 20000;  // dense: nothing is seen through it
   const Surface leaves = leaf_cloud(cloud);
-  for (const double resolution : {0.02, 0.1, 0.3}) EXPECT_EQ(wall_part(leaves, resolution), 0.0) << resolution;
+  for (const double resolution : {0.02, 0.1, 0.3}) {
+    EXPECT_EQ(part_of(WallKind::None, leaves, resolution), 1.0) << resolution;
+  }
   Surface needles = make_tube(3, 1, 0.01f, 1.0f);
-  EXPECT_EQ(wall_part(needles, 0.1), 0.0);
+  EXPECT_EQ(part_of(WallKind::None, needles, 0.1), 1.0);
 }
 
 TEST(Walls, LeavesThatLieInALayerAtAllAnglesAreNone) {
@@ -123,10 +153,10 @@ TEST(Walls, FacesWithoutAreaDoNoHarm) {
   Surface boards = make_boards(0.02f);
   boards.triangles.emplace_back(0, 1, 1);
   boards.materials.push_back(boards.materials[0]);
-  const auto is_wall = find_walls(boards, 2);
-  ASSERT_TRUE(is_wall);
-  EXPECT_EQ(is_wall->back(), 0);
-  EXPECT_EQ(is_wall->front(), 1);
+  const auto kinds = find_walls(boards, 2);
+  ASSERT_TRUE(kinds);
+  EXPECT_EQ(kinds->back(), WallKind::None);
+  EXPECT_EQ(kinds->front(), WallKind::Closed);
 }
 
 TEST(WallShell, ClosesGapsAndKeepsTheSize) {
