@@ -30,7 +30,7 @@ SHARED = ROOT.parent / "shared/assets"
 SIMPLIFIED_LIGHT = "daylight"  # all five would take as long again as our own levels, twice
 
 # Of the shared assets; * as on the command line, # a mesh of a glTF.
-SHARED_ASSETS = ["trees/small_maple.obj.gz*", "trees/small_maple_cards.glb*", "trees/small_maple.glb.gz", "trees/small_maple.ply.gz",
+SHARED_ASSETS = ["trees/small_maple.obj.gz*", "trees/small_maple_cards.glb*", "trees/small_maple.glb.gz*", "trees/small_maple.ply.gz",
                  "meshes/stanford-bunny.obj.gz*", "meshes/suzanne_cc2.obj.gz*", "meshes/spot/spot_quadrangulated.obj",
                  "meshes/spot/spot_control_mesh.obj", "forest/forest_pullback.glb#0", "forest/forest_pullback.glb#1",
                  "forest/forest_pullback.glb#2", "forest/forest_pullback.glb#3", "gltf-import/glTF-Transform/Box.glb",
