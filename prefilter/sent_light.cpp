@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "prefilter/random_lobe.h"
 #include "scattering/highlight.h"
 #include "scattering/hot_spot.h"
 #include "scattering/microfacet_brdf.h"
@@ -28,11 +29,8 @@ struct Normals {
 /// scattering/horizon_lobe.h.
 vec3 base_lobe(const Normals& normals, bool is_through, SplitMix& random) {
   const float side = is_through ? -1.0f : 1.0f;
-  const auto u1 = to_unit_float(random.next()), u2 = to_unit_float(random.next());
-  const vec3 direction = cosine_lobe(side * normals.shading, u1, u2);
-  if (!normals.is_below_horizon(direction, is_through)) return direction;
-  const auto v1 = to_unit_float(random.next()), v2 = to_unit_float(random.next());
-  return cosine_lobe(side * normals.geometric, v1, v2);
+  const vec3 direction = random_lobe(side * normals.shading, random);
+  return normals.is_below_horizon(direction, is_through) ? random_lobe(side * normals.geometric, random) : direction;
 }
 
 /// Of the base: on the side that the light came from or, as often as light goes through, on the other.
@@ -69,10 +67,10 @@ SentOn scattered_by_facet(const Highlight& highlight, float once, const Normals&
 }
 
 /// Of the highlight: by one facet or, of rough ones, over several. `rest`: what the whole surface absorbs.
-SentOn scattered_by_highlight(const Highlight& highlight, const Normals& normals, const vec3& wo, float rest,
-                              SplitMix& random) {
+/// share: towards wo.
+SentOn scattered_by_highlight(const Highlight& highlight, const HighlightShare& share, const Normals& normals,
+                              const vec3& wo, float rest, SplitMix& random) {
   const vec3& seen = normals.shading;
-  const HighlightShare share = highlight.share(glm::dot(seen, wo));
   const float all = component_sum(highlight.albedo(share)), once = component_sum(highlight.once(share));
   const bool is_once = static_cast<float>(random.next_unit()) * all < once;
   SentOn sent;
@@ -80,8 +78,7 @@ SentOn scattered_by_highlight(const Highlight& highlight, const Normals& normals
     sent = scattered_by_facet(highlight, once, normals, wo, random);
     sent.opening = rest * seen;
   } else {
-    const auto u1 = to_unit_float(random.next()), u2 = to_unit_float(random.next());
-    sent.direction = cosine_lobe(seen, u1, u2);
+    sent.direction = random_lobe(seen, random);
     sent.weight = 1;
   }
   sent.contrast = glm::dot(wo, sent.direction);
@@ -96,14 +93,18 @@ template <typename Material>
 std::optional<SentOn> scattered(const Material& m, const Normals& normals, const vec3& direction, SplitMix& random) {
   const vec3 wo = -direction;
   const Highlight highlight(m.specular, m.roughness2);
+  HighlightShare share{};
   vec3 mirror(0.0f);
-  if (highlight.exists()) mirror = highlight.albedo(highlight.share(glm::dot(normals.shading, wo)));
+  if (highlight.exists()) {
+    share = highlight.share(glm::dot(normals.shading, wo));
+    mirror = highlight.albedo(share);
+  }
   const float of_mirror = component_sum(mirror);
   const float of_base = component_sum((vec3(1.0f) - mirror) * (m.diffuse + m.transmission)), all = of_mirror + of_base;
   if (!(all > 0)) return {};
   SentOn sent;
   if (static_cast<float>(random.next_unit()) * all < of_mirror) {
-    sent = scattered_by_highlight(highlight, normals, wo, 1 - std::min(all / 3, 1.0f), random);
+    sent = scattered_by_highlight(highlight, share, normals, wo, 1 - std::min(all / 3, 1.0f), random);
   } else {
     sent = scattered_by_base(m, normals, direction, random);
     sent.color = (vec3(1.0f) - mirror) * (m.diffuse + m.transmission) * (all / of_base);

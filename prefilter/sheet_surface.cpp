@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <unordered_map>
@@ -13,6 +12,7 @@
 
 #include "base/hash.h"
 #include "base/parallel.h"
+#include "prefilter/disjoint_sets.h"
 #include "prefilter/grid_cells.h"
 #include "prefilter/isotropic_lines.h"
 #include "prefilter/material_filter.h"
@@ -258,20 +258,12 @@ FittedShape fit_shape(std::span<const Trial> trials) {
 
 /// Faces by the connected sheet that they are of, in order of first faces.
 std::vector<std::vector<uint32_t>> connected_faces(const Surface& sheet) {
-  std::vector<uint32_t> first(sheet.positions.size());
-  std::iota(first.begin(), first.end(), 0u);
-  const auto find = [&](uint32_t v) {
-    while (first[v] != v) v = first[v] = first[first[v]];
-    return v;
-  };
-  for (const uvec3& t : sheet.triangles) {
-    const uint32_t least = std::min({find(t.x), find(t.y), find(t.z)});
-    for (int c = 0; c < 3; ++c) first[find(t[c])] = least;
-  }
+  DisjointSets vertices(sheet.positions.size());
+  for (const uvec3& t : sheet.triangles) vertices.join(t.x, t.y), vertices.join(t.x, t.z);
   std::vector<std::vector<uint32_t>> parts;
   std::unordered_map<uint32_t, size_t> part_of;
   for (uint32_t f = 0; f < sheet.triangles.size(); ++f) {
-    const auto [place, is_new] = part_of.try_emplace(find(sheet.triangles[f].x), parts.size());
+    const auto [place, is_new] = part_of.try_emplace(vertices.least_of(sheet.triangles[f].x), parts.size());
     if (is_new) parts.emplace_back();
     parts[place->second].push_back(f);
   }

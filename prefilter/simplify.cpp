@@ -12,6 +12,7 @@
 #include "base/index.h"
 #include "base/parallel.h"
 #include "cache/level.h"
+#include "prefilter/disjoint_sets.h"
 #include "prefilter/edge_table.h"
 #include "prefilter/material_filter.h"
 #include "prefilter/vertex_placement.h"
@@ -484,28 +485,18 @@ void group_by_part(const std::vector<uint32_t>& part_of, size_t part_count, std:
 }
 
 Parts find_parts(const Surface& surface) {
-  std::vector<uint32_t> root(surface.positions.size());
-  std::iota(root.begin(), root.end(), 0u);
-  const auto find_root = [&](uint32_t v) {
-    while (root[v] != v) v = root[v] = root[root[v]];
-    return v;
-  };
-  for (const uvec3& t : surface.triangles) {
-    for (const uint32_t other : {t.y, t.z}) {
-      const uint32_t a = find_root(t.x), b = find_root(other);
-      root[std::max(a, b)] = std::min(a, b);
-    }
-  }
+  DisjointSets vertices(surface.positions.size());
+  for (const uvec3& t : surface.triangles) vertices.join(t.x, t.y), vertices.join(t.x, t.z);
 
   std::vector<uint32_t> part_of_vertex(surface.positions.size(), kNoIndex), part_of_face(surface.triangles.size());
   uint32_t part_count = 0;
   for (size_t face = 0; face < surface.triangles.size(); ++face) {
-    uint32_t& part = part_of_vertex[find_root(surface.triangles[face].x)];
+    uint32_t& part = part_of_vertex[vertices.least_of(surface.triangles[face].x)];
     if (part == kNoIndex) part = part_count++;
     part_of_face[face] = part;
   }
   for (const uvec3& t : surface.triangles) {
-    for (int c = 0; c < 3; ++c) part_of_vertex[t[c]] = part_of_vertex[find_root(t[c])];
+    for (int c = 0; c < 3; ++c) part_of_vertex[t[c]] = part_of_vertex[vertices.least_of(t[c])];
   }
   // A root that no face uses can not exist: it is a vertex of a face or alone.
   Parts parts;

@@ -7,9 +7,9 @@
 
 #include "prefilter/grid_cells.h"
 #include "prefilter/material_filter.h"
+#include "prefilter/random_lobe.h"
 #include "prefilter/vertex_placement.h"
 #include "scattering/albedo.h"
-#include "scattering/warp.h"
 
 namespace farfield {
 namespace {
@@ -81,11 +81,6 @@ std::optional<PieceSeen> PieceViewer::look(const vec3& origin, const vec3& direc
   const vec3 point = origin + hit->distance * direction;
   seen.escapes = !pieces_.is_stopped(point, on, 1e-4f * resolution_, kEscapeLength * resolution_, random);
   return seen;
-}
-
-vec3 random_lobe(const vec3& normal, SplitMix& random) {
-  const float u1 = to_unit_float(random.next()), u2 = to_unit_float(random.next());
-  return cosine_lobe(normal, u1, u2);
 }
 
 const FaceMaterial& no_material() {

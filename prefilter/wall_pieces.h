@@ -55,9 +55,6 @@ class PieceViewer {
   float resolution_;
 };
 
-/// Cosine distributed around a unit normal.
-vec3 random_lobe(const vec3& normal, SplitMix& random);
-
 /// Nothing of anything: what sums start from.
 const FaceMaterial& no_material();
 

@@ -13,6 +13,7 @@
 #include "base/parallel.h"
 #include "base/split_mix.h"
 #include "prefilter/material_filter.h"
+#include "prefilter/random_lobe.h"
 #include "prefilter/ray_scene.h"
 #include "prefilter/triangle_pieces.h"
 #include "prefilter/voxel_marks.h"

@@ -13,6 +13,7 @@
 #include "base/hash.h"
 #include "base/parallel.h"
 #include "base/split_mix.h"
+#include "prefilter/disjoint_sets.h"
 #include "prefilter/grid_cells.h"
 #include "prefilter/layers.h"
 #include "prefilter/ray_scene.h"
@@ -40,8 +41,8 @@ constexpr double kMostTransmission = 0.02;              ///< mean albedo of what
 constexpr double kNearPlane = 0.75, kNearMiddle = 2.0;  ///< what a layer's middle answers for
 constexpr int kNearCells = 3;                           ///< cells around it that reach so far
 
-/// What this layer's middle answers for.
-bool owns(const Layer& layer, const dvec3& point) {
+/// Whether this layer's middle answers for a point.
+bool answers_for(const Layer& layer, const dvec3& point) {
   const dvec3 offset = point - layer.middle;
   const double height = layer.height(point);
   return std::abs(height) <= kNearPlane && glm::dot(offset, offset) - height * height <= kNearMiddle * kNearMiddle;
@@ -153,14 +154,9 @@ LayerSeen look_at(const OpacityScene& scene, const Layer& layer, double resoluti
   return seen;
 }
 
-/// Layers that go on from cell to cell, as numbers of their first cells. What is no part of a sheet is alone.
-std::vector<uint32_t> connect(const std::vector<LayerCell>& cells, const std::vector<LayerSeen>& seen) {
-  std::vector<uint32_t> first(cells.size());
-  std::iota(first.begin(), first.end(), 0u);
-  const auto find = [&](uint32_t i) {
-    while (first[i] != i) i = first[i] = first[first[i]];
-    return i;
-  };
+/// Layers that go on from cell to cell. What is no part of a sheet is alone.
+DisjointSets connect(const std::vector<LayerCell>& cells, const std::vector<LayerSeen>& seen) {
+  DisjointSets connected(cells.size());
   std::unordered_map<uint64_t, uint32_t> number;
   for (uint32_t i = 0; i < cells.size(); ++i) {
     if (seen[i].is_part_of_sheet()) number[cell_key(cells[i].cell)] = i;
@@ -174,13 +170,10 @@ std::vector<uint32_t> connect(const std::vector<LayerCell>& cells, const std::ve
       const Layer& b = cells[found->second].layer;
       const bool goes_on = std::abs(glm::dot(a.normal, b.normal)) >= kSameNormal &&
                            std::abs(a.height(b.middle)) <= kSamePlane && std::abs(b.height(a.middle)) <= kSamePlane;
-      if (!goes_on) return;
-      const uint32_t one = find(i), other = find(found->second);
-      first[std::max(one, other)] = std::min(one, other);
+      if (goes_on) connected.join(i, found->second);
     });
   }
-  for (uint32_t i = 0; i < first.size(); ++i) first[i] = find(i);
-  return first;
+  return connected;
 }
 
 /// Whether these cells are a half-open wall. Planks, wires and holes are as open everywhere; scales, feathers and
@@ -202,12 +195,13 @@ bool is_half_open(const std::vector<const LayerSeen*>& cells) {
 
 /// Per layer: whether it belongs to a half-open wall.
 std::vector<uint8_t> find_sheets(const std::vector<LayerCell>& cells, const std::vector<LayerSeen>& seen) {
-  const std::vector<uint32_t> first = connect(cells, seen);
+  DisjointSets connected = connect(cells, seen);
   std::vector<std::vector<const LayerSeen*>> parts(cells.size());
-  for (size_t i = 0; i < cells.size(); ++i) parts[first[i]].push_back(&seen[i]);
+  for (uint32_t i = 0; i < cells.size(); ++i) parts[connected.least_of(i)].push_back(&seen[i]);
   std::vector<uint8_t> is_sheet(cells.size(), 0);
-  for (size_t i = 0; i < cells.size(); ++i) {
-    is_sheet[i] = first[i] == i ? is_half_open(parts[i]) : is_sheet[first[i]];
+  for (uint32_t i = 0; i < cells.size(); ++i) {
+    const uint32_t first = connected.least_of(i);
+    is_sheet[i] = first == i ? is_half_open(parts[i]) : is_sheet[first];
   }
   return is_sheet;
 }
@@ -226,7 +220,7 @@ class LayerGrid {
     const auto found = near_.find(cell_key(ivec3(glm::floor(point))));
     if (found == near_.end()) return false;
     for (const uint32_t i : found->second) {
-      if (farfield::owns(layers_[i], point)) return true;
+      if (answers_for(layers_[i], point)) return true;
     }
     return false;
   }
