@@ -21,6 +21,7 @@
 #include <numeric>
 
 #include "base/check.h"
+#include "base/float4.h"
 #include "base/hash.h"
 #include "bvh/traced_morph.h"
 
@@ -32,29 +33,50 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // How much the range in which a ray meets an instance's local bounds is widened: rounding of the slab test.
 constexpr float kRangePad = 1e-6f;
 
-vec3 origin_of(const EmbreeRay& ray) { return {ray.org_x, ray.org_y, ray.org_z}; }
-vec3 direction_of(const EmbreeRay& ray) { return {ray.dir_x, ray.dir_y, ray.dir_z}; }
+/// A ray in the lanes that Embree has it in: w is tnear and time.
+struct RayLanes {
+  Float4 origin;
+  Float4 direction;
 
-/// Puts a ray into local space, and back at the end of the scope. Lanes 3 (tnear, time) stay as they are.
+  static RayLanes of(const EmbreeRay& ray) { return {load4(&ray.org_x), load4(&ray.dir_x)}; }
+  void store_to(EmbreeRay& ray) const { store4(&ray.org_x, origin), store4(&ray.dir_x, direction); }
+};
+static_assert(offsetof(EmbreeRay, tnear) == 3 * sizeof(float) && offsetof(EmbreeRay, dir_x) == 4 * sizeof(float) &&
+              offsetof(EmbreeRay, time) == 7 * sizeof(float));
+
+/// Puts a ray into local space, and back at the end of the scope.
 class InLocalSpace {
  public:
-  InLocalSpace(EmbreeRay& ray, const LocalRay& local)
-      : ray_(ray), origin_(origin_of(ray)), direction_(direction_of(ray)) {
-    set(local.origin, local.direction);
-  }
-  ~InLocalSpace() { set(origin_, direction_); }
+  InLocalSpace(EmbreeRay& ray, const RayLanes& local) : ray_(ray), world_(RayLanes::of(ray)) { local.store_to(ray); }
+  ~InLocalSpace() { world_.store_to(ray_); }
   InLocalSpace(const InLocalSpace&) = delete;
   InLocalSpace& operator=(const InLocalSpace&) = delete;
 
  private:
-  void set(const vec3& origin, const vec3& direction) {
-    ray_.org_x = origin.x, ray_.org_y = origin.y, ray_.org_z = origin.z;
-    ray_.dir_x = direction.x, ray_.dir_y = direction.y, ray_.dir_z = direction.z;
-  }
   EmbreeRay& ray_;
-  vec3 origin_;
-  vec3 direction_;
+  RayLanes world_;
 };
+
+RayLanes to_local(const InstanceRecord& record, const EmbreeRay& ray) {
+  const RayLanes world = RayLanes::of(ray);
+  return {with_w_of(record.point_to_local(world.origin), world.origin),
+          with_w_of(record.vector_to_local(world.direction), world.direction)};
+}
+
+/// is_traceable() of lanes.
+bool is_traceable(const RayLanes& ray) {
+  const Float4 size = abs4(ray.origin) + abs4(ray.direction);
+  return size[0] + size[1] + size[2] <= 1.8e18f;
+}
+
+/// clip_to_box() of lanes.
+RayRange clip_to_box(const RayLanes& ray, float t_far, const Box3& box) {
+  const Float4 inverse = 1.0f / ray.direction;
+  const Float4 a = (load4(&box.lower.x) - ray.origin) * inverse;
+  const Float4 b = (load4(&box.upper.x) - ray.origin) * inverse;
+  const Float4 near = max4(splat4(ray.origin[3]), min4(a, b)), far = min4(splat4(t_far), max4(a, b));
+  return {std::max(std::max(near[0], near[1]), near[2]), std::min(std::min(far[0], far[1]), far[2])};
+}
 
 /// Random bits of a ray in an instance.
 uint64_t bits_of_ray(const RayContext& context, uint32_t instance) { return mix64(context.ray_seed, instance); }
@@ -65,20 +87,25 @@ uint64_t bits_of_ray(const RayContext& context, uint32_t instance) { return mix6
 
 /// A ray that enters an instance: with which level it deals there.
 struct InstanceGeometry::Visit {
-  LocalRay ray;
+  RayLanes ray;  ///< in local space
   float t_entry;
   LevelChoice choice;
   const TracedLevel* level = nullptr;
   const TracedMorph* morph = nullptr;  ///< in place of the level
+
+  LocalRay ray_up_to(float t_far) const {
+    const Float4 &o = ray.origin, &d = ray.direction;
+    return {{o[0], o[1], o[2]}, {d[0], d[1], d[2]}, o[3], t_far};
+  }
 };
 
 /// Fills in `visit` but for the level itself. False: the ray passes by.
 inline bool InstanceGeometry::choose(const InstanceRecord& record, uint32_t instance, const EmbreeRay& ray,
                                      const RayContext& context, Visit& visit) const {
   const TracedAsset& asset = *assets[record.asset];
-  visit.ray = {record.point_to_local(origin_of(ray)), record.vector_to_local(direction_of(ray)), ray.tnear, ray.tfar};
+  visit.ray = to_local(record, ray);
   if (!is_traceable(visit.ray)) return false;
-  const RayRange range = clip_to_box(visit.ray, asset.bounds);
+  const RayRange range = clip_to_box(visit.ray, ray.tfar, asset.bounds);
   if (!(range.t_near * (1.0f - kRangePad) <= range.t_far * (1.0f + kRangePad))) return false;
   visit.t_entry = range.t_near;
   visit.choice = choose_level(asset, record.footprint, record.limits, instance, context, range.t_near, forced_lambda);
@@ -102,7 +129,8 @@ bool InstanceGeometry::enter(const InstanceRecord& record, uint32_t instance, co
   return visit.level != nullptr;
 }
 
-/// The nearest hit on a level, and what the record has of it. False: none, and ray_hit's ids are not to be trusted.
+/// The nearest hit on a level, and what the record has of it. False: none, ray_hit's ids are not to be trusted, and the
+/// record is as it was.
 bool InstanceGeometry::intersect_level(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
                                        EmbreeContext& embree_context, HitRecord& made) {
   const TracedLevel& level = *visit.level;
@@ -112,18 +140,20 @@ bool InstanceGeometry::intersect_level(const Visit& visit, uint64_t ray_bits, Em
     const InLocalSpace scope(ray_hit.ray, visit.ray);
     on_surface = trace_nearest(level.scene.handle(), embree_context, ray_hit);
   }
-  made.level_slot = static_cast<uint8_t>(level.slot);
   if (!level.volume.is_empty()) {
-    LocalRay up_to_surface = visit.ray;
-    up_to_surface.t_far = ray_hit.ray.tfar;
+    const LocalRay up_to_surface = visit.ray_up_to(ray_hit.ray.tfar);
     if (const auto collision = level.volume.first_collision(up_to_surface, flight_seed(ray_bits, level.slot))) {
       ray_hit.ray.tfar = collision->t;
+      made = {};
+      made.level_slot = static_cast<uint8_t>(level.slot);
       made.is_volume = true;
       made.element = collision->payload;
       return true;
     }
   }
   if (!on_surface) return false;
+  made = {};
+  made.level_slot = static_cast<uint8_t>(level.slot);
   made.element = 2 * hit.primID + quad_side(hit.u, hit.v);
   const vec2 barycentric = face_barycentric(hit.u, hit.v);
   made.barycentric[0] = barycentric.x, made.barycentric[1] = barycentric.y;
@@ -136,6 +166,7 @@ bool InstanceGeometry::intersect_morph(const Visit& visit, uint64_t ray_bits, Em
   const InLocalSpace scope(ray_hit.ray, visit.ray);
   const auto found = visit.morph->intersect(ray_hit, embree_context, visit.choice.blend, ray_bits);
   if (!found) return false;
+  made = {};
   made.level_slot = static_cast<uint8_t>(visit.choice.slot);
   made.blend = visit.choice.blend;
   made.is_volume = found->is_volume;
@@ -154,7 +185,8 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
   EmbreeRay& ray = ray_hit.ray;
   RTCHit& hit = ray_hit.hit;
   const unsigned outer_id = hit.geomID;
-  HitRecord made;
+  HitRecord unwanted;
+  HitRecord& made = record ? *record : unwanted;
   const bool is_hit = visit.morph
                           ? intersect_morph(visit, bits_of_ray(context, instance), ray_hit, *embree_context, made)
                           : intersect_level(visit, bits_of_ray(context, instance), ray_hit, *embree_context, made);
@@ -178,7 +210,6 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
   hit.Ng_x = normal_world.x, hit.Ng_y = normal_world.y, hit.Ng_z = normal_world.z;
   hit.geomID = geometry_id;
   hit.primID = instance;
-  if (record) *record = made;
   return true;
 }
 
@@ -199,11 +230,11 @@ bool InstanceGeometry::occluded(uint32_t instance, EmbreeRay& ray, RayContext& c
   }
   const BrickVolume& volume = visit.level->volume;
   if (transmittance) {
-    *transmittance *= std::exp(-volume.optical_depth(visit.ray));
+    *transmittance *= std::exp(-volume.optical_depth(visit.ray_up_to(ray.tfar)));
     return false;
   }
-  if (volume.is_empty() ||
-      !volume.first_collision(visit.ray, flight_seed(bits_of_ray(context, instance), visit.level->slot)))
+  if (volume.is_empty() || !volume.first_collision(visit.ray_up_to(ray.tfar),
+                                                   flight_seed(bits_of_ray(context, instance), visit.level->slot)))
     return false;
   ray.tfar = -kInfinity;
   return true;

@@ -27,19 +27,15 @@ bool is_in_range(const glm::dmat3& m) { return is_in_range(m[0]) && is_in_range(
 }  // namespace
 
 vec3 InstanceRecord::normal_to_world(const vec3& n) const {
-  return static_cast<float>(handedness) *
-         (n.x * vec3(world_to_local[0]) + n.y * vec3(world_to_local[1]) + n.z * vec3(world_to_local[2]));
+  const auto& m = world_to_local;
+  return static_cast<float>(handedness) * vec3(glm::dot(m[0], n), glm::dot(m[1], n), glm::dot(m[2], n));
 }
 
-mat3 InstanceRecord::linear_to_local() const {
-  return glm::transpose(mat3(vec3(world_to_local[0]), vec3(world_to_local[1]), vec3(world_to_local[2])));
-}
+mat3 InstanceRecord::linear_to_local() const { return mat3(world_to_local[0], world_to_local[1], world_to_local[2]); }
 
 void InstanceRecord::set_inverse(const glm::dmat3& linear, const glm::dvec3& translation) {
-  for (int row = 0; row < 3; ++row) {
-    world_to_local[static_cast<size_t>(row)] =
-        vec4(glm::dvec4(linear[0][row], linear[1][row], linear[2][row], translation[row]));
-  }
+  for (int axis = 0; axis < 3; ++axis) world_to_local[axis] = vec3(linear[axis]);
+  world_to_local[3] = vec3(translation);
   handedness = glm::determinant(linear) < 0.0 ? -1 : 1;
 }
 
@@ -79,7 +75,7 @@ float largest_stretch(const mat4x3& local_to_world) {
 Box3 instance_bounds(const InstanceRecord& instance, const TracedAsset& asset) {
   // From the rounded inverse that rays really use.
   const glm::dmat3 to_world = glm::inverse(glm::dmat3(instance.linear_to_local()));
-  const glm::dvec3 back(instance.world_to_local[0].w, instance.world_to_local[1].w, instance.world_to_local[2].w);
+  const glm::dvec3 back(instance.world_to_local[3]);
   Box3 bounds;
   const auto extend = [&](const vec3& p) { bounds.extend(vec3(to_world * (glm::dvec3(p) - back))); };
   if (asset.hull.empty()) {

@@ -2,9 +2,9 @@
 // An instance of an asset: where it stands, and what it asks of levels.
 #pragma once
 
-#include <array>
 #include <cstdint>
 
+#include "base/float4.h"
 #include "base/result.h"
 #include "base/vec.h"
 #include "bvh/level_choice.h"
@@ -14,27 +14,29 @@ namespace farfield {
 
 /// One instance: what a ray needs in one cache line.
 struct alignas(64) InstanceRecord {
-  std::array<vec4, 3> world_to_local;  ///< rows
+  mat4x3 world_to_local;
   InstanceFootprint footprint;
   uint32_t asset = 0;
   int8_t handedness = 1;  ///< sign of the transform's determinant
   LevelLimits limits;
-  bool moves = false;  ///< while the shutter is open: the rows are those of its beginning (bvh/instance_motion.h)
+  bool moves = false;  ///< while the shutter is open: the matrix is that of its beginning (bvh/instance_motion.h)
 
-  vec3 point_to_local(const vec3& p) const {
-    const auto row = [&](const vec4& r) { return r.x * p.x + r.y * p.y + r.z * p.z + r.w; };
-    return {row(world_to_local[0]), row(world_to_local[1]), row(world_to_local[2])};
-  }
+  vec3 point_to_local(const vec3& p) const { return vector_to_local(p) + world_to_local[3]; }
   vec3 vector_to_local(const vec3& v) const {
-    const auto row = [&](const vec4& r) { return r.x * v.x + r.y * v.y + r.z * v.z; };
-    return {row(world_to_local[0]), row(world_to_local[1]), row(world_to_local[2])};
+    return world_to_local[0] * v.x + world_to_local[1] * v.y + world_to_local[2] * v.z;
   }
+  /// The same of the first three lanes; the fourth is anything.
+  Float4 point_to_local(const Float4& p) const { return vector_to_local(p) + column(3); }
+  Float4 vector_to_local(const Float4& v) const { return column(0) * v[0] + column(1) * v[1] + column(2) * v[2]; }
   /// World-space normal of a local one, up to scale: transpose(W2L) n; flips under mirroring like a flattened mesh's.
   vec3 normal_to_world(const vec3& n) const;
   /// The linear part of world_to_local.
   mat3 linear_to_local() const;
-  /// The rows and the handedness, of world_to_local's linear part and translation; its determinant is not 0.
+  /// The matrix and the handedness, of world_to_local's linear part and translation; its determinant is not 0.
   void set_inverse(const glm::dmat3& linear, const glm::dvec3& translation);
+
+ private:
+  Float4 column(int i) const { return load4(&world_to_local[i].x); }  // reads on into what follows
 };
 static_assert(sizeof(InstanceRecord) == 64);
 

@@ -17,6 +17,7 @@
 #include "bvh/instance_geometry.h"
 #include "bvh/ray_cost.h"
 #include "cache/level_file.h"
+#include "cache/manifest.h"
 #include "scattering/warp.h"
 #include "tests/support/random_unit.h"
 
@@ -54,9 +55,10 @@ struct RaySet {
 /// A loaded level as an asset of its own.
 class LevelAsset : public LevelSource {
  public:
-  LevelAsset(BvhDevice& device, const std::filesystem::path& path)
+  LevelAsset(BvhDevice& device, const std::filesystem::path& path, const std::vector<vec3>& hull)
       : file_(need(LevelFile::open(path, LevelCheck::Full))), level_(need(TracedLevel::build(device, view(), 0))) {
     asset_.bounds = padded_bounds(view().header.bounds);
+    asset_.hull = hull;
     asset_.base_resolution = 1;
     asset_.level_numbers = {0.0f};
     asset_.usable_slots = {0};
@@ -235,7 +237,8 @@ int run(const std::filesystem::path& folder, int rounds) {
   const auto device = need(BvhDevice::create());
   const EmbreeDevice host = need(make_embree_device());
   std::vector<std::unique_ptr<LevelAsset>> levels;
-  for (const auto& path : paths) levels.push_back(std::make_unique<LevelAsset>(*device, path));
+  const std::vector<vec3> hull = need(read_manifest(folder)).hull;
+  for (const auto& path : paths) levels.push_back(std::make_unique<LevelAsset>(*device, path, hull));
   std::sort(levels.begin(), levels.end(),
             [](const auto& a, const auto& b) { return a->view().header.level < b->view().header.level; });
   if (levels.empty() || !levels[0]->view().has_surface() || levels[0]->view().header.level != 0) {
