@@ -31,6 +31,7 @@
 #include "cache/level_file.h"
 #include "import/read_volume.h"
 #include "prefilter/face_materials.h"
+#include "prefilter/keep_apart.h"
 #include "prefilter/macrosurface.h"
 #include "prefilter/place_lattice.h"
 #include "prefilter/resolve.h"
@@ -336,9 +337,10 @@ class Baker {
 
     options_.job.report(share_done(level, 0.03), fmt::format("level {}: simplify", level));
     const Stopwatch simplification;
-    const SimplifyResult simplified =
+    SimplifyResult simplified =
         simplify(parts.macrosurface, {.resolution = static_cast<float>(resolution)}, options_.job);
     if (options_.job.is_cancelled()) return cancelled();
+    FARFIELD_TRY(keep_walls_apart(level, resolution, parts.macrosurface, simplified, level_report));
     SurfaceOrder order = order_surface(simplified.surface);
     surface_ = reorder(simplified.surface, order);
     note_shell(first_shell_face, simplified, order);
@@ -349,6 +351,19 @@ class Baker {
     compose(from_stored_.face, order.face_number);
     level_report.simplify_seconds = simplification.seconds();
     return order;
+  }
+
+  Result<void> keep_walls_apart(uint32_t level, double resolution, const Surface& macrosurface,
+                                SimplifyResult& simplified, LevelReport& level_report) {
+    FARFIELD_TRY_LET(level_report.apart, keep_apart(macrosurface, static_cast<float>(resolution), simplified));
+    const ApartReport& apart = level_report.apart;
+    if (apart.crossing > 0) {
+      report_.warnings.push_back(fmt::format(
+          "level {}: of {} vertices of walls close behind each other, {} still are on the wrong side; their "
+          "colours may show through",
+          level, apart.walls, apart.crossing));
+    }
+    return {};
   }
 
   /// Takes the surface around the last level's walls away. Pieces stay in wall_ where it still is macrosurface;

@@ -16,6 +16,7 @@
 #include "import/source_volume.h"
 #include "prefilter/condition.h"
 #include "prefilter/downsample_fog.h"
+#include "prefilter/keep_apart.h"
 
 namespace farfield {
 
@@ -45,6 +46,7 @@ struct LevelReport {
   uint64_t voxelized_triangles = 0;     ///< all sub-resolution geometry up to this level
   uint64_t triangles = 0;               ///< after simplification
   uint64_t voxels = 0;
+  ApartReport apart;  ///< of walls close behind each other
   double analysis_seconds = 0, simplify_seconds = 0, voxelize_seconds = 0, write_seconds = 0;
   bool resumed = false;     ///< taken from an earlier, interrupted bake
   bool is_written = false;  ///< false: it saves nothing over a finer level

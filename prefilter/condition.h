@@ -15,7 +15,7 @@
 namespace farfield {
 
 /// Goes up when condition() or what the bake makes of its result gives other results.
-inline constexpr uint32_t kConditionVersion = 4;
+inline constexpr uint32_t kConditionVersion = 5;
 
 struct ImportedAsset {
   SourceSurface source;

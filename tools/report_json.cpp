@@ -28,6 +28,8 @@ Json level_json(const LevelEntry& entry, const BakeReport& report) {
   json["resumed"] = stages->resumed;
   json["macrosurface_triangles"] = stages->macrosurface_triangles;
   json["voxelized_triangles"] = stages->voxelized_triangles;
+  json["close_walls"] = {
+      {"vertices", stages->apart.walls}, {"moved", stages->apart.moved}, {"crossing", stages->apart.crossing}};
   json["seconds"] = {{"analysis", stages->analysis_seconds},
                      {"simplify", stages->simplify_seconds},
                      {"voxelize", stages->voxelize_seconds},
