@@ -21,6 +21,7 @@ TEST(BakeReportJson, HasLevelsSecondsAndWarnings) {
   stages.voxelize_seconds = 3.5;
   stages.write_seconds = 0.5;
   stages.voxelized_triangles = 12;
+  stages.apart = {.walls = 7, .moved = 5, .crossing = 1};
   report.levels = {stages};
   report.warnings = {"dropped 3 faces"};
   report.total_seconds = 9.0;
@@ -33,6 +34,7 @@ TEST(BakeReportJson, HasLevelsSecondsAndWarnings) {
   EXPECT_EQ(json["levels"][1]["level"], 3);
   EXPECT_EQ(json["levels"][1]["voxels"], 77);
   EXPECT_EQ(json["levels"][1]["voxelized_triangles"], 12);
+  EXPECT_EQ(json["levels"][1]["close_walls"], nlohmann::json({{"vertices", 7}, {"moved", 5}, {"crossing", 1}}));
   EXPECT_EQ(json["levels"][1]["seconds"]["voxelize"], 3.5);
 }
 
