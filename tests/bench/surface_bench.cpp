@@ -6,6 +6,7 @@
 #include <benchmark/benchmark.h>
 
 #include "base/random.h"
+#include "prefilter/keep_apart.h"
 #include "prefilter/macrosurface.h"
 #include "prefilter/simplify.h"
 #include "prefilter/voxel_marks.h"
@@ -38,6 +39,21 @@ void simplify_surface(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<int64_t>(collapses));  // items: collapses
 }
 
+/// What walls close behind each other add: the same sphere twice, one in the other.
+void keep_walls_apart(benchmark::State& state) {
+  const Surface outer = make_source(static_cast<int>(state.range(0)) / 2);
+  Surface inner = outer;
+  for (vec3& p : inner.positions) p *= 0.999f;
+  const Surface source = test::join(outer, inner);
+  const float resolution = 2.0f / static_cast<float>(state.range(1));
+  const SimplifyResult simplified = simplify(source, {.resolution = resolution});
+  for (auto _ : state) {
+    SimplifyResult apart = simplified;
+    benchmark::DoNotOptimize(keep_apart(source, resolution, apart));
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<int64_t>(source.triangles.size()));
+}
+
 /// Straight hairs across a cube of side 1, two triangles each.
 Surface make_hair(int hairs) {
   Surface surface;
@@ -65,6 +81,12 @@ BENCHMARK(classify)
     ->ArgNames({"faces", "grid"})
     ->Args({200'000, 512})
     ->Args({200'000, 64})
+    ->Args({200'000, 8})
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime();
+BENCHMARK(keep_walls_apart)
+    ->ArgNames({"faces", "grid"})
+    ->Args({200'000, 128})
     ->Args({200'000, 8})
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime();
