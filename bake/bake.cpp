@@ -72,8 +72,9 @@ std::string canonical_options(const BakeOptions& options, bool is_volume) {
                                          canonical_text(import_options(options).subdivision), kConditionVersion);
   if (options.source_only) return "source_only=1 " + import;
   constexpr int kMorphVersion = 1;  // of what the manifest has of morphs
-  return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} {} voxelize={} morph={}", options.finest_grid,
-                     options.coarsest_grid, options.rays_per_voxel, import, kVoxelizeVersion, kMorphVersion);
+  return fmt::format("finest_grid={} coarsest_grid={} rays_per_voxel={} {} voxelize={} morph={} simplify={},{}",
+                     options.finest_grid, options.coarsest_grid, options.rays_per_voxel, import, kVoxelizeVersion,
+                     kMorphVersion, name_of(options.simplify), kSimplifyVersion);
 }
 
 /// What a bake of `source` with these options writes into its manifest, but for the levels.
@@ -132,7 +133,7 @@ struct SplitSurface {
   std::vector<uint32_t> macro_face;  ///< for each face of the whole: its number in macrosurface, or kMorphVoxelized
 };
 
-/// Moves the faces that are not macrosurface behind those of `sub_resolution`.
+/// Moves the faces that are not macrosurface behind those of `sub_resolution`, where quads are not known any more.
 SplitSurface split(const Surface& surface, const std::vector<uint8_t>& is_macrosurface, Surface& sub_resolution) {
   SplitSurface result;
   result.macrosurface.positions = surface.positions;
@@ -143,6 +144,7 @@ SplitSurface split(const Surface& surface, const std::vector<uint8_t>& is_macros
       result.macro_face.push_back(static_cast<uint32_t>(result.macrosurface.triangles.size()));
       result.macrosurface.triangles.push_back(surface.triangles[f]);
       result.macrosurface.materials.push_back(surface.materials[f]);
+      if (surface.has_quads()) result.macrosurface.quad.push_back(surface.quad[f]);
       continue;
     }
     result.macro_face.push_back(kMorphVoxelized);
@@ -169,12 +171,13 @@ Surface compact(const Surface& surface) {
   return result;
 }
 
-/// Adds a surface of the same origin that shares no vertex.
+/// Adds a surface of the same origin that shares no vertex, as triangles.
 void append(const Surface& added, Surface& surface) {
   const auto first = static_cast<uint32_t>(surface.positions.size());
   surface.positions.insert(surface.positions.end(), added.positions.begin(), added.positions.end());
   for (const uvec3& t : added.triangles) surface.triangles.push_back(t + first);
   surface.materials.insert(surface.materials.end(), added.materials.begin(), added.materials.end());
+  if (surface.has_quads()) surface.quad.resize(surface.triangles.size(), kNoIndex);
 }
 
 /// Less than what a level with such a volume and surface has resident.
@@ -338,7 +341,7 @@ class Baker {
     options_.job.report(share_done(level, 0.03), fmt::format("level {}: simplify", level));
     const Stopwatch simplification;
     SimplifyResult simplified =
-        simplify(parts.macrosurface, {.resolution = static_cast<float>(resolution)}, options_.job);
+        simplify(parts.macrosurface, {static_cast<float>(resolution), options_.simplify}, options_.job);
     if (options_.job.is_cancelled()) return cancelled();
     FARFIELD_TRY(keep_walls_apart(level, resolution, parts.macrosurface, simplified, level_report));
     SurfaceOrder order = order_surface(simplified.surface);

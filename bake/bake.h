@@ -17,6 +17,7 @@
 #include "prefilter/condition.h"
 #include "prefilter/downsample_fog.h"
 #include "prefilter/keep_apart.h"
+#include "prefilter/simplify.h"
 
 namespace farfield {
 
@@ -25,6 +26,7 @@ struct BakeOptions {
   uint32_t coarsest_grid = 8;     ///< last level, the root
   uint32_t rays_per_voxel = 200;  ///< thesis 10.1.3
   Downsampling downsampling = Downsampling::Matched;  ///< of volumes, whose grids and rays the file decides
+  SimplifyMethod simplify = SimplifyMethod::Auto;     ///< of meshes
   bool source_only = false;                           ///< write only level 0 (what --full-detail renders)
   bool even_if_up_to_date = false;  ///< of an asset in memory: its hash does not say all that it depends on
   ImportOptions import;

@@ -26,8 +26,9 @@ struct Pair {
   uint32_t apex0 = 0, apex1 = 0;
 };
 
-/// The matching of triangles. First the edges that are the longest of both their triangles: that is how quads were
-/// split, and such pairs have the smallest bounds. Then what is left, starting with triangles that have one choice.
+/// The matching of triangles. First the halves of quads that are known; then the edges that are the longest of both
+/// their triangles: that is how quads were split, and such pairs have the smallest bounds. Then what is left, starting
+/// with triangles that have one choice.
 class Pairing {
  public:
   explicit Pairing(const Surface& surface)
@@ -42,6 +43,7 @@ class Pairing {
 
   std::vector<Pair> run() {
     const auto count = static_cast<uint32_t>(surface_.triangles.size());
+    join_halves();
     for (uint32_t f = 0; f < count; ++f) {
       if (!is_free_[f]) continue;
       const uint32_t corner = longest_edge(f);
@@ -103,6 +105,17 @@ class Pairing {
     int count = 0;
     for (uint32_t c = 0; c < 3; ++c) count += partner(face, c) != kNoIndex;
     return count;
+  }
+
+  /// Quads that are known already.
+  void join_halves() {
+    if (!surface_.has_quads()) return;
+    for (uint32_t f = 0; f < surface_.quad.size(); ++f) {
+      for (uint32_t c = 0; c < 3 && is_free_[f] && surface_.quad[f] != kNoIndex; ++c) {
+        const uint32_t other = partner(f, c);
+        if (other != kNoIndex && surface_.quad[other] == surface_.quad[f]) join(f, c, other);
+      }
+    }
   }
 
   void join(uint32_t face, uint32_t corner, uint32_t other) {
@@ -332,6 +345,8 @@ Surface reorder(const Surface& surface, const SurfaceOrder& order) {
   }
   result.materials.resize(surface.materials.size());
   for (size_t f = 0; f < surface.materials.size(); ++f) result.materials[order.face_number[f]] = surface.materials[f];
+  result.quad.resize(surface.quad.size());
+  for (size_t f = 0; f < surface.quad.size(); ++f) result.quad[order.face_number[f]] = surface.quad[f];
   return result;
 }
 

@@ -20,8 +20,9 @@ struct SurfaceOrder {
   std::vector<uint32_t> face_number;    ///< for each triangle: its final number
 };
 
-/// Pairs and orders. Two triangles become a quad when they share an edge and have the same winding; their shared edge
-/// is the quad's diagonal v1-v3, so that the quad is exactly the two triangles. Depends only on the surface.
+/// Pairs and orders: first the halves of the surface's own quads. Two triangles become a quad when they share an edge
+/// and have the same winding; their shared edge is the quad's diagonal v1-v3, so that the quad is exactly the two
+/// triangles. Depends only on the surface.
 SurfaceOrder order_surface(const Surface& surface);
 
 /// The surface with vertices (without unused ones) and triangles in their final order. Corners of a triangle may be

@@ -126,6 +126,7 @@ class Triangulation {
 
   void run(const std::vector<uint32_t>& source_face, const Job& job) {
     for (size_t face = 0; face < mesh_.face_count() && !job.is_cancelled(); ++face) add_face(face, source_face[face]);
+    if (quads_ == 0) free_memory(surface_.quad);
     if (degenerate_ > 0) mesh_.warnings.push_back(fmt::format("{} faces have no area; dropped", degenerate_));
     if (repeated_ > 0) {
       mesh_.warnings.push_back(
@@ -139,10 +140,13 @@ class Triangulation {
     points_.clear();
     for (const uint32_t c : corners_) points_.emplace_back(surface_.positions[vertex_of(c)]);
     bool has_area = false;
+    const size_t first = surface_.triangles.size();
     for (const uvec3& t : triangulate_polygon(points_)) {
       has_area |= add_triangle({corners_[t.x], corners_[t.y], corners_[t.z]}, mesh_.face_material[face], source_face);
     }
     if (!has_area) ++degenerate_;
+    const bool is_quad = corners_.size() == 4 && surface_.triangles.size() == first + 2;
+    surface_.quad.resize(surface_.triangles.size(), is_quad ? quads_++ : kNoIndex);
   }
 
   /// False: it has no area.
@@ -184,6 +188,7 @@ class Triangulation {
   SourceSurface& surface_;
   std::unordered_set<uvec3, TriangleKeyHash> seen_;
   size_t degenerate_ = 0, repeated_ = 0;
+  uint32_t quads_ = 0;
   std::vector<uint32_t> corners_;
   std::vector<dvec3> points_;
 };

@@ -21,6 +21,7 @@ struct TrianglePart {
   vec3 at(const vec3& barycentric) const {
     return barycentric.x * corners[0] + barycentric.y * corners[1] + barycentric.z * corners[2];
   }
+  bool is_whole() const { return corners == TrianglePart{}.corners; }
 };
 
 /// For each part: averages over it of textures, vertex colours, shading normals and the spread of normal maps; of a

@@ -356,6 +356,8 @@ ResolvedSurface finish(const SourceSurface& source, const PartMesh& mesh, const 
     }
     out.surface.triangles.push_back(t);
     out.surface.materials.push_back(materials[f]);
+    // What was split or cut is no half any more.
+    if (!source.quad.empty()) out.surface.quad.push_back(mesh.parts[f].is_whole() ? source.quad[triangle] : kNoIndex);
   }
   number.resize(source.positions.size());
   out.vertex_of = std::move(number);

@@ -331,7 +331,7 @@ Result<Surface> lay_sheet(const Surface& pieces, double resolution) {
   for (const std::vector<uint32_t>& part : connected_faces(sheet)) shade(part, seen, places, sheet);
 
   // Faces where nothing was hit are no sheet.
-  Surface result{sheet.positions, {}, {}, sheet.origin};
+  Surface result{sheet.positions, {}, {}, sheet.origin, {}};
   for (size_t f = 0; f < sheet.triangles.size(); ++f) {
     if (!sheet.materials[f].sheet.is_sheet()) continue;
     result.triangles.push_back(sheet.triangles[f]);

@@ -1,17 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
-// Resolution-based simplification of macrosurfaces with filtered materials (thesis 8.1 to 8.3).
+// Resolution-based simplification of macrosurfaces with filtered materials (thesis 8.1 to 8.4).
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "base/job.h"
+#include "base/result.h"
 #include "prefilter/surface.h"
 
 namespace farfield {
 
+/// Goes up when simplify() gives other results.
+inline constexpr uint32_t kSimplifyVersion = 1;
+
+/// What collapses.
+enum class SimplifyMethod {
+  Auto,   ///< as Loops in connected parts of well-structured quads, as Edges in the others
+  Loops,  ///< face loops of quads, edges of the other faces: quads stay quads
+  Edges,  ///< edges of all faces
+};
+const char* name_of(SimplifyMethod method);
+Result<SimplifyMethod> parse_simplify_method(const std::string& name);  ///< auto, loops or edges
+
 struct SimplifyOptions {
   float resolution = 0;  ///< r_k in scene units; collapsing stops at edges of about half of it. <= 0: nothing collapses
+  SimplifyMethod method = SimplifyMethod::Auto;
 };
 
 /// A simplified surface and where everything went; kMorphVoxelized and kMorphCollapsed are in cache/level.h.
@@ -21,9 +36,9 @@ struct SimplifyResult {
   std::vector<uint32_t> face_map;    ///< input face -> output face, or kMorphCollapsed
 };
 
-/// Collapses edges, shortest first, until they are about half the resolution long, and filters the materials of the
-/// faces around each collapse so that their area-weighted mean stays (8.3.8). Output faces keep the order, the winding
-/// and the corner order of the input faces that they come from; output vertices are those used by faces.
+/// Collapses face loops or edges until faces are about half the resolution wide, and filters the materials around each
+/// collapse so that their area-weighted mean stays (8.3.8). Output faces keep the order, the winding, the corner order
+/// and the quad of the input faces that they come from (Edges: no quads); output vertices are those used by faces.
 ///
 /// What stays: topology (link condition), so a manifold stays one; borders and non-manifold edges, which collapse only
 /// along themselves; the orientation of every face; the area enclosed by a plane border; and the distance to the

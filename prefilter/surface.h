@@ -44,8 +44,12 @@ struct Surface {
   std::vector<uvec3> triangles;         ///< indices < positions.size(), no repeated index
   std::vector<FaceMaterial> materials;  ///< one per triangle
   dvec3 origin{0.0};  ///< of positions in the source's space; (0,0,0) unless the source lies far from its origin
+  /// One per triangle: the two halves of a quad have the same number, which no other triangle has; kNoIndex: half of
+  /// none. A half whose other half is gone is a triangle like others. Empty: there are no quads.
+  std::vector<uint32_t> quad;
 
   Box3 bounds() const;
+  bool has_quads() const { return !quad.empty(); }
 };
 
 }  // namespace farfield

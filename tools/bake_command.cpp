@@ -124,11 +124,11 @@ std::vector<std::string> flags_without_use(const BakeArguments& arguments) {
     const BakeOptions usual;
     const BakeOptions& options = arguments.options;
     if (options.finest_grid == usual.finest_grid && options.rays_per_voxel == usual.rays_per_voxel &&
-        options.import.subdivision.scheme == SubdivisionScheme::None)
+        options.import.subdivision.scheme == SubdivisionScheme::None && options.simplify == usual.simplify)
       return {};
-    return {
-        fmt::format("{}: --finest-grid, --rays-per-voxel and --subdivide are for models; a volume's grid is its own",
-                    arguments.source)};
+    return {fmt::format(
+        "{}: --finest-grid, --rays-per-voxel, --subdivide and --simplify are for models; a volume's grid is its own",
+        arguments.source)};
   }
   if (canonical_text(arguments.options.import.fog).empty()) return {};
   return {fmt::format("{}: is no volume; flags of volumes change nothing", arguments.source)};
@@ -200,6 +200,7 @@ void add_bake_command(CLI::App& app, Action& action) {
   add_fog_flags(command, options.import.fog);
   add_downsampling_flag(command, options.downsampling);
   add_subdivision_flags(command, options.import.subdivision);
+  add_simplify_flag(command, options.simplify)->excludes(scene);  // which has triangles only
   command->add_flag("--source-only", options.source_only, "Write level 0 only: the source, ready to render");
   command->add_option("--threads", arguments->threads, "0: as many as the machine has")
       ->check(CLI::Range(0, 4096))

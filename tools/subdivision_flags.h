@@ -3,6 +3,7 @@
 // files.
 #pragma once
 
+#include "bake/bake.h"
 #include "import/subdivision_options.h"
 #include "tools/flags.h"
 
@@ -32,6 +33,14 @@ inline void add_subdivision_flags(CLI::App* command, SubdivisionOptions& options
                     "Where texture coordinates stay linear: none, corners-only, corners-plus1, corners-plus2, "
                     "boundaries, all. Without it the file's own, or corners-plus1")
       ->needs(scheme);
+}
+
+/// How levels of meshes are made.
+inline CLI::Option* add_simplify_flag(CLI::App* command, SimplifyMethod& method) {
+  return add_parsed_option(command, "--simplify", method, parse_simplify_method,
+                           "What collapses on coarser levels: loops (of quads, which stay quads; edges of other "
+                           "faces), edges (of all faces), auto (loops of well-structured parts, edges of the others)")
+      ->default_str(name_of(method));
 }
 
 }  // namespace farfield::tool

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long do the steps of a bake take that grow with the faces: macrosurface analysis, simplification, marking voxels?
-// Does the work per face stay bounded when the source is much finer than the resolution, or much coarser? And how near
-// is voxelisation to what Embree alone needs for as many rays? Run: build/release/bin/surface_bench (thesis: 15 us per
-// face, 170 us per collapse).
+// How long do the steps of a bake take that grow with the faces: macrosurface analysis, simplification by edges and by
+// face loops, marking voxels? Does the work per face stay bounded when the source is much finer than the resolution, or
+// much coarser? And how near is voxelisation to what Embree alone needs for as many rays? Run:
+// build/release/bin/surface_bench (thesis: 15 us per face, 170 us per collapse).
 #include <benchmark/benchmark.h>
 
 #include "base/random.h"
+#include "prefilter/collapse_loops.h"
 #include "prefilter/keep_apart.h"
 #include "prefilter/macrosurface.h"
 #include "prefilter/simplify.h"
@@ -54,6 +55,16 @@ void keep_walls_apart(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations() * static_cast<int64_t>(source.triangles.size()));
 }
 
+/// Faces: halves of quads.
+void collapse_face_loops(benchmark::State& state) {
+  const int across = static_cast<int>(std::sqrt(static_cast<double>(state.range(0)) / 6.0));
+  Surface torus = test::make_torus(3 * across, across, 0.35f);
+  test::pair_into_quads(torus);
+  const double resolution = 2.7 / static_cast<double>(state.range(1));
+  for (auto _ : state) benchmark::DoNotOptimize(collapse_loops(torus, resolution));
+  state.SetItemsProcessed(state.iterations() * static_cast<int64_t>(torus.triangles.size()));
+}
+
 /// Straight hairs across a cube of side 1, two triangles each.
 Surface make_hair(int hairs) {
   Surface surface;
@@ -94,6 +105,14 @@ BENCHMARK(mark_hair)
     ->ArgNames({"hairs", "grid"})
     ->Args({100'000, 64})
     ->Args({100'000, 512})
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime();
+BENCHMARK(collapse_face_loops)
+    ->ArgNames({"faces", "grid"})
+    ->Args({20'000, 64})
+    ->Args({20'000, 8})
+    ->Args({200'000, 128})
+    ->Args({200'000, 8})
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime();
 BENCHMARK(simplify_surface)

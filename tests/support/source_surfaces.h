@@ -15,6 +15,7 @@ inline SourceSurface source_of(const Surface& surface) {
   SourceSurface source;
   source.positions = surface.positions;
   source.triangles = surface.triangles;
+  source.quad = surface.quad;
   source.origin = surface.origin;
   source.material.assign(surface.triangles.size(), 0);
   for (uint32_t f = 0; f < surface.triangles.size(); ++f) source.source_face.push_back(f);

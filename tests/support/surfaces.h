@@ -2,8 +2,10 @@
 // Surfaces of known shape for the tests of the bake.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <functional>
+#include <map>
 
 #include "base/vec.h"
 #include "prefilter/surface.h"
@@ -55,6 +57,28 @@ inline Surface make_tube(int around, int along, float radius, float length) {
   return make_grid(around, along, true, [=](float u, float v) {
     return vec3(radius * std::cos(2 * kPi * u), radius * std::sin(2 * kPi * u), length * v);
   });
+}
+
+/// A torus with radii 1 and `tube` around the z axis.
+inline Surface make_torus(int around, int across, float tube) {
+  Surface surface;
+  for (int i = 0; i < around; ++i) {
+    for (int j = 0; j < across; ++j) {
+      const float phi = 2 * kPi * static_cast<float>(i) / static_cast<float>(around);
+      const float theta = 2 * kPi * static_cast<float>(j) / static_cast<float>(across);
+      const float radius = 1.0f + tube * std::cos(theta);
+      surface.positions.emplace_back(radius * std::cos(phi), radius * std::sin(phi), tube * std::sin(theta));
+    }
+  }
+  const auto vertex = [&](int i, int j) { return static_cast<uint32_t>((i % around) * across + j % across); };
+  for (int i = 0; i < around; ++i) {
+    for (int j = 0; j < across; ++j) {
+      surface.triangles.emplace_back(vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1));
+      surface.triangles.emplace_back(vertex(i, j), vertex(i + 1, j + 1), vertex(i, j + 1));
+    }
+  }
+  add_materials(surface);
+  return surface;
 }
 
 /// A closed sphere around the origin: latitude rings and two poles.
@@ -110,6 +134,56 @@ inline Surface leaf_cloud(const LeafCloud& cloud) {
     material.diffuse = vec3(rng.next(), 0.5f, 0.25f);
     surface.materials.insert(surface.materials.end(), 2, material);
   }
+  return surface;
+}
+
+/// Makes a quad of each two triangles that follow each other and share an edge.
+inline void pair_into_quads(Surface& surface) {
+  surface.quad.assign(surface.triangles.size(), 0xffffffffu);
+  for (size_t f = 0; f + 1 < surface.triangles.size(); ++f) {
+    int shared = 0;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) shared += surface.triangles[f][i] == surface.triangles[f + 1][j];
+    }
+    if (shared != 2) continue;
+    surface.quad[f] = surface.quad[f + 1] = static_cast<uint32_t>(f);
+    ++f;
+  }
+}
+
+/// A rounded cube from -1 to 1: six grids of side x side quads, and eight corners where three of them meet.
+inline Surface make_rounded_cube(int side, float radius) {
+  Surface surface;
+  std::map<std::array<int, 3>, uint32_t> number;
+  const auto vertex = [&](std::array<int, 3> at) {
+    const auto [found, is_new] = number.try_emplace(at, static_cast<uint32_t>(surface.positions.size()));
+    if (is_new) {
+      vec3 p;
+      for (size_t c = 0; c < 3; ++c)
+        p[static_cast<int>(c)] = 2.0f * static_cast<float>(at[c]) / static_cast<float>(side) - 1;
+      const vec3 inner = glm::clamp(p, vec3(radius - 1), vec3(1 - radius));
+      surface.positions.push_back(radius > 0 ? inner + radius * glm::normalize(p - inner) : p);
+    }
+    return found->second;
+  };
+  for (size_t axis = 0; axis < 3; ++axis) {
+    for (const int level : {0, side}) {
+      for (int i = 0; i < side; ++i) {
+        for (int j = 0; j < side; ++j) {
+          const auto at = [&](int u, int v) {
+            std::array<int, 3> p{};
+            p[axis] = level;
+            p[(axis + 1) % 3] = level > 0 ? u : v;  // outwards on both sides
+            p[(axis + 2) % 3] = level > 0 ? v : u;
+            return vertex(p);
+          };
+          surface.triangles.emplace_back(at(i, j), at(i + 1, j), at(i + 1, j + 1));
+          surface.triangles.emplace_back(at(i, j), at(i + 1, j + 1), at(i, j + 1));
+        }
+      }
+    }
+  }
+  add_materials(surface);
   return surface;
 }
 

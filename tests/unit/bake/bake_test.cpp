@@ -174,9 +174,8 @@ TEST_F(Bake, WritesACascadeThatOpensAndShrinks) {
   EXPECT_EQ(report->levels[1].macrosurface_triangles, 960u);
 }
 
-TEST_F(Bake, MapsEveryVertexAndFaceToTheNextStoredLevel) {
-  ASSERT_TRUE(bake(ball_in_leaves(), "thing", out(), small_options()).has_value());
-  const auto levels = open_levels(out());
+/// That each level's vertices and faces go to places of the next one: at t = 1 a morph is that, bit for bit.
+void expect_complete_maps(const std::vector<std::unique_ptr<LevelFile>>& levels) {
   for (size_t i = 1; i < levels.size(); ++i) {
     const LevelView &fine = levels[i - 1]->view(), &coarse = levels[i]->view();
     ASSERT_EQ(fine.positions.size(), coarse.morph_vertex.size());
@@ -212,6 +211,37 @@ TEST_F(Bake, MapsEveryVertexAndFaceToTheNextStoredLevel) {
       }
     }
   }
+}
+
+TEST_F(Bake, MapsEveryVertexAndFaceToTheNextStoredLevel) {
+  ASSERT_TRUE(bake(ball_in_leaves(), "thing", out(), small_options()).has_value());
+  expect_complete_maps(open_levels(out()));
+}
+
+TEST_F(Bake, QuadsStayQuadsWhereLoopsCollapse) {
+  Surface cube = test::make_rounded_cube(40, 0.2f);
+  test::pair_into_quads(cube);
+  BakeOptions options = small_options();
+  options.simplify = SimplifyMethod::Loops;
+  ASSERT_TRUE(bake(test::asset_of(cube), "cube", out(), options).has_value());
+  const auto levels = open_levels(out());
+  ASSERT_GE(levels.size(), 3u);
+  expect_complete_maps(levels);
+  for (const auto& level : levels) {
+    for (const Quad& quad : level->view().quads) EXPECT_TRUE(quad.is_pair());
+  }
+  EXPECT_LT(face_count(levels.back()->view()), face_count(levels.front()->view()) / 16);
+
+  const uint32_t first = levels[1]->view().header.level;
+  const std::string name = read_manifest(out())->levels[1].file;
+  const std::string with_loops = files_of(out()).at(name);
+  options.coarsest_grid = options.finest_grid >> (first - 1);  // further down auto may take edges
+  options.simplify = SimplifyMethod::Auto;
+  ASSERT_TRUE(bake(test::asset_of(cube), "cube", out(), options).has_value());
+  EXPECT_TRUE(files_of(out()).at(name) == with_loops);
+  options.simplify = SimplifyMethod::Edges;
+  ASSERT_TRUE(bake(test::asset_of(cube), "cube", out(), options).has_value());
+  EXPECT_FALSE(files_of(out()).at(name) == with_loops);
 }
 
 TEST_F(Bake, StoresAHullThatContainsAllLevels) {

@@ -66,6 +66,20 @@ TEST(ImportObj, AllWaysToWriteAFaceAreOne) {
   }
 }
 
+TEST(ImportObj, FacesOfFourCornersAreQuads) {
+  const TemporaryFolder folder;
+  const std::string points = std::string(kQuadObj) + "v 2 0 0\nv 2 1 0\nv 3 0 0\nv 1 2 0\nv 0.5 3 0\n";
+  // A quad, a triangle, a quad, one with a corner twice, one of five corners of which three are in line.
+  const auto mixed =
+      test::import_surface(folder.write("a.obj", points + "f 1 2 3 4\nf 5 7 6\nf 2 5 6 3\nf 5 7 7 3\nf 4 3 6 8 9\n"));
+  ASSERT_TRUE(mixed) << mixed.error().message;
+  const uint32_t none = 0xffffffffu;
+  EXPECT_EQ(mixed->surface.quad, (std::vector<uint32_t>{0, 0, none, 1, 1, none, none, none}));
+  const auto triangles = test::import_surface(folder.write("b.obj", points + "f 1 2 3\nf 3 4 1\n"));
+  ASSERT_TRUE(triangles) << triangles.error().message;
+  EXPECT_FALSE(triangles->surface.has_quads());
+}
+
 TEST(ImportObj, BlenderMaterialsMeanWhatBlenderMeans) {
   const TemporaryFolder folder;
   folder.write("m.mtl",

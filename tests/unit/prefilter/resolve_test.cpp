@@ -103,6 +103,17 @@ TEST(Resolve, SplitsWhereATextureVariesAndOnlyThere) {
   EXPECT_NEAR(mean, 0.1 + 0.8 / 16 / 2, 2e-3);
 }
 
+TEST(Resolve, QuadsAreKnownWhereTheyStayWhole) {
+  SourceSurface source = square();
+  EXPECT_FALSE(resolve(source, 0.01f)->surface.has_quads());
+  source.quad = {7, 7};
+  EXPECT_EQ(resolve(source, 0.01f)->surface.quad, (std::vector<uint32_t>{7, 7}));
+  source.materials[0].base_color_map.image =
+      image(256, [](int x, int y) { return vec4(vec3((x / 8 + y / 8) % 2 ? 0.9f : 0.1f), 1); });
+  const auto split = resolve(source, 1.0f / 32);
+  EXPECT_EQ(split->surface.quad, std::vector<uint32_t>(split->surface.triangles.size(), kNoIndex));
+}
+
 TEST(Resolve, DetailBelowTheResolutionDoesNotSplit) {
   SourceSurface source = square();
   source.materials[0].base_color_map.image = image(256, [](int x, int y) { return vec4(vec3(float((x + y) % 2)), 1); });
