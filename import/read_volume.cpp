@@ -12,6 +12,7 @@
 #include "base/file_io.h"
 #include "base/hash.h"
 #include "base/text.h"
+#include "import/resample_volume.h"
 #include "import/volume_module.h"
 
 namespace farfield {
@@ -27,6 +28,16 @@ Result<void> check_exists(const fs::path& path) {
   if (!fs::exists(status)) return make_error(ErrorCode::NotFound, fmt::format("{}: no such file", path.string()));
   if (fs::is_regular_file(status)) return {};
   return make_error(ErrorCode::Io, fmt::format("{}: is not a regular file", path.string()));
+}
+
+Result<SourceVolume> on_cubes(const fs::path& path, VolumeOnLattice&& read, const Job& job) {
+  if (read.shape.is_cube()) return std::move(read.volume);
+  auto cubes = resample_to_cubes(read.volume, read.shape, job);
+  if (!cubes && cubes.error().code == ErrorCode::Unsupported)
+    return make_error(cubes.error().code, fmt::format("{}: {}", path.string(), cubes.error().message));
+  FARFIELD_TRY_LET(auto volume, std::move(cubes));
+  volume.warnings.push_back(fmt::format("{}: {}", path.string(), resampling_text(read.shape)));
+  return volume;
 }
 
 }  // namespace
@@ -77,7 +88,8 @@ Result<SourceVolume> read_volume(const fs::path& path, const FogOptions& options
   FARFIELD_TRY(check_options(options));
   FARFIELD_TRY(check_exists(path));
   FARFIELD_TRY_LET(const VolumeModule* module, volume_module());
-  FARFIELD_TRY_LET(auto volume, module->read(path.string(), options, job));
+  FARFIELD_TRY_LET(auto read, module->read(path.string(), options, job));
+  FARFIELD_TRY_LET(auto volume, on_cubes(path, std::move(read), job));
   FARFIELD_TRY_LET(volume.source_hash, hash_volume(path, options));
   return volume;
 }

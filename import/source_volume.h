@@ -15,8 +15,9 @@ namespace farfield {
 inline constexpr int kVolumeBrickSide = 8;      ///< as cache/level.h has it
 inline constexpr int kVolumeBrickVoxels = 512;  ///< x fastest, then y, then z
 inline constexpr uint32_t kEmptyBrick = 0xffffffffu;
-inline constexpr uint64_t kMostVolumeVoxels = 0xfffffff0ull;  ///< of a level: payload indices have 32 bits
-inline constexpr double kDensestVolume = 1e30;                ///< times lengths and squares stay floats
+inline constexpr uint64_t kMostTableBricks = uint64_t{1} << 26;  ///< the table of a level takes 4 bytes for each
+inline constexpr uint64_t kMostVolumeVoxels = 0xfffffff0ull;     ///< of a level: payload indices have 32 bits
+inline constexpr double kDensestVolume = 1e30;                   ///< times lengths and squares stay floats
 
 /// sigma_t of 8^3 voxels in 1 / scene unit, finite and >= 0.
 using DensityBrick = std::array<float, kVolumeBrickVoxels>;

@@ -25,7 +25,6 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 
 constexpr double kSmallNegative = 1e-3;  ///< of the largest density: what filters leave behind, not an error
-constexpr uint64_t kMostTableBricks = uint64_t{1} << 26;  ///< the table of a level takes 4 bytes for each
 constexpr std::array<const char*, 6> kEmissionNames = {"temperature", "heat", "flame", "flames", "fire", "emission"};
 constexpr std::array<const char*, 2> kAlbedoNames = {"albedo", "Cd"};
 
@@ -64,8 +63,7 @@ struct Contents {
 /// How a grid's lattice lies in the source's space.
 struct Lattice {
   openvdb::math::Mat4d index_to_source;
-  glm::dmat3 rotation{1.0};
-  double voxel_size = 0;
+  VoxelShape shape;
 
   /// index: in OpenVDB's sense, where voxels have their centres at whole numbers.
   dvec3 to_source(const openvdb::Vec3d& index) const {
@@ -103,11 +101,11 @@ class VdbReader {
     return extent;
   }
 
-  Result<SourceVolume> read() {
+  Result<VolumeOnLattice> read() {
     FARFIELD_TRY_LET(const auto header, open_density());
     FARFIELD_TRY_LET(const Lattice lattice, lattice_of(*header));
-    volume_.rotation = lattice.rotation;
-    volume_.voxel_size = lattice.voxel_size;
+    volume_.rotation = lattice.shape.rotation;
+    volume_.voxel_size = lattice.shape.size;
     volume_.anisotropy = static_cast<float>(options_.anisotropy);
     const std::string name = header->getName();
     auto base = file_.readGrid(name);
@@ -119,7 +117,7 @@ class VdbReader {
     base.reset();
     FARFIELD_TRY(take_albedo(*header));
     warn_of_the_rest(name);
-    return std::move(volume_);
+    return VolumeOnLattice{std::move(volume_), lattice.shape};
   }
 
  private:
@@ -195,22 +193,15 @@ class VdbReader {
       return error(ErrorCode::Unsupported, "the grid \"{}\" lies in a frustum; resample it to a linear transform",
                    grid.getName());
     }
-    Lattice lattice{affine->getMat4()};
+    Lattice lattice{affine->getMat4(), {}};
     std::array<dvec3, 3> edges;
     for (int axis = 0; axis < 3; ++axis) {  // rows: OpenVDB's vectors stand on the left
       const auto& m = lattice.index_to_source;
       edges[static_cast<size_t>(axis)] = {m(axis, 0), m(axis, 1), m(axis, 2)};
     }
-    const VoxelShape shape = voxel_shape(edges);
-    if (shape.is_singular)
+    lattice.shape = voxel_shape(edges);
+    if (lattice.shape.is_singular)
       return error(ErrorCode::BadFile, "the transform of the grid \"{}\" is singular or not finite", grid.getName());
-    if (!shape.is_cube()) {
-      return error(ErrorCode::Unsupported,
-                   "voxels of the grid \"{}\" are {}: only cubes are read; resample it to uniform voxels",
-                   grid.getName(), shape.other_shape);
-    }
-    lattice.voxel_size = shape.size;
-    lattice.rotation = shape.rotation;
     return lattice;
   }
 
@@ -519,13 +510,13 @@ Result<VolumeExtent> read_extent(const std::string& path, const FogOptions& opti
   return guarded<VolumeExtent>(path, [&] { return VdbReader(path, options, {}).read_extent(); });
 }
 
-Result<SourceVolume> read(const std::string& path, const FogOptions& options, const Job& job) {
-  return guarded<SourceVolume>(path, [&] { return VdbReader(path, options, job).read(); });
+Result<VolumeOnLattice> read(const std::string& path, const FogOptions& options, const Job& job) {
+  return guarded<VolumeOnLattice>(path, [&] { return VdbReader(path, options, job).read(); });
 }
 
 }  // namespace
 }  // namespace farfield
 
-extern "C" FARFIELD_API const farfield::VolumeModule farfield_volume_module_2;
-const farfield::VolumeModule farfield_volume_module_2 = {farfield::read_extent, farfield::read,
+extern "C" FARFIELD_API const farfield::VolumeModule farfield_volume_module_3;
+const farfield::VolumeModule farfield_volume_module_3 = {farfield::read_extent, farfield::read,
                                                          farfield::write_openvdb};

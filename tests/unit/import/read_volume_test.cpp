@@ -120,13 +120,30 @@ TEST_F(ReadVolume, TransformsThatTurnMirrorAndMoveAreKept) {
   EXPECT_EQ(read(write({plain})).rotation, glm::dmat3(1.0));
 }
 
-TEST_F(ReadVolume, VoxelsThatAreNoCubesAreRefused) {
-  VdbGrid grid = one_voxel();
+TEST_F(ReadVolume, VoxelsThatAreNoCubesAreResampled) {
+  VdbGrid grid = one_voxel({3, 0, 5}, 0.75);
   grid.index_to_source[2][2] = 2;
-  EXPECT_NE(failure(write({grid}), ErrorCode::Unsupported).find("1 x 1 x 2: only cubes are read"), std::string::npos);
+  const SourceVolume tall = read(write({grid}));
+  EXPECT_TRUE(has_warning(tall, "cloud.vdb: voxels are 1 x 1 x 2: resampled onto cubes of 1"));
+  EXPECT_EQ(tall.dims, ivec3(1, 1, 2));
+  EXPECT_EQ(tall.active_voxels, 2u);
+  EXPECT_EQ(density_at(tall, {0, 0, 0}), 0.75f);
+  EXPECT_EQ(density_at(tall, {0, 0, 1}), 0.75f);
+  expect_near(tall.origin, {2.5, -0.5, 9}, 1e-12);
+  EXPECT_NE(tall.source_hash, 0u);
   grid.index_to_source = glm::dmat4(1.0);
   grid.index_to_source[1][0] = 0.3;
-  EXPECT_NE(failure(write({grid}), ErrorCode::Unsupported).find("sheared"), std::string::npos);
+  EXPECT_TRUE(has_warning(read(write({grid})), "1 x 1.04403 x 1, sheared: resampled onto cubes of 1"));
+  grid.index_to_source = glm::dmat4(1.0);
+  grid.index_to_source[2][2] = 1e11;
+  EXPECT_NE(failure(write({grid}), ErrorCode::Unsupported).find("cloud.vdb: as cubes of 1 it has more than"),
+            std::string::npos);
+  grid.voxels.push_back({{4000000, 4000000, 5}, 1});
+  grid.index_to_source[2][2] = 2000;
+  EXPECT_NE(failure(write({grid}), ErrorCode::Unsupported).find("extends over"), std::string::npos);
+}
+
+TEST_F(ReadVolume, FrustaAreRefused) {
   const fs::path frustum = folder_.path() / "frustum.vdb";
   test::write_frustum_vdb(frustum);
   EXPECT_NE(failure(frustum, ErrorCode::Unsupported).find("frustum"), std::string::npos);
