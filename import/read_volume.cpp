@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <string_view>
 
 #include "base/file_io.h"
 #include "base/hash.h"
@@ -21,6 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array<char, 8> kVdbMagic = {' ', 'B', 'D', 'V', 0, 0, 0, 0};
+constexpr std::string_view kNanoVdbMagic = "NanoVDB";  ///< and a digit
 
 Result<void> check_exists(const fs::path& path) {
   std::error_code error;
@@ -48,6 +50,8 @@ Result<void> check_options(const FogOptions& options) {
     return invalid(fmt::format("--density-scale must be above 0 and finite, not {}", options.density_scale));
   if (!(std::abs(options.anisotropy) <= kMostAnisotropy))
     return invalid(fmt::format("--anisotropy must be from -{0} to {0}, not {1}", kMostAnisotropy, options.anisotropy));
+  if (!(options.fibre_roughness >= 0 && options.fibre_roughness <= 1))
+    return invalid(fmt::format("--fibre-roughness must be from 0 to 1, not {}", options.fibre_roughness));
   if (!options.albedo) return {};
   const vec3& albedo = *options.albedo;
   if (!is_finite(albedo) || min_component(albedo) < 0 || max_component(albedo) > 1)
@@ -62,6 +66,7 @@ std::string canonical_text(const FogOptions& options) {
   if (options.albedo) text += fmt::format(" albedo={},{},{}", options.albedo->x, options.albedo->y, options.albedo->z);
   if (options.anisotropy != 0) text += fmt::format(" anisotropy={}", options.anisotropy);
   if (options.level_set) text += " level_set=1";
+  if (options.fibre_roughness != kFibreRoughness) text += fmt::format(" fibre_roughness={}", options.fibre_roughness);
   return text;
 }
 
@@ -73,8 +78,10 @@ uint64_t hash_of(const FogOptions& options) {
 bool is_volume_file(const fs::path& path) {
   std::array<char, 8> start{};
   std::ifstream stream(path, std::ios::binary);
-  if (stream.read(start.data(), start.size())) return start == kVdbMagic;
-  return lower_case(path.extension().string()) == ".vdb";
+  if (stream.read(start.data(), start.size()))
+    return start == kVdbMagic || std::string_view(start.data(), kNanoVdbMagic.size()) == kNanoVdbMagic;
+  const std::string extension = lower_case(path.extension().string());
+  return extension == ".vdb" || extension == ".nvdb";
 }
 
 Result<VolumeExtent> read_volume_extent(const fs::path& path, const FogOptions& options) {

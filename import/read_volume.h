@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reading OpenVDB files (.vdb): the density of a fog volume, with albedos if there are any.
+// Reading OpenVDB and NanoVDB files (.vdb, .nvdb): the density of a fog volume, with albedos if there are any.
 //
 // Grids: density is "density", or the only float grid that is a fog volume, or what the options name; float, half and
 // double. Albedos are a vec3 grid "albedo" or "Cd" (of "X_level_2": "albedo_level_2") on its lattice. Emission (flame)

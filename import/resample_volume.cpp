@@ -4,10 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -25,6 +27,8 @@ constexpr uint32_t kManyBricks = kEmptyBrick - 1;
 struct NewBrick {
   DensityBrick densities{};
   AlbedoBrick albedos{};
+  ShapeBrick shapes{};
+  NumberBrick anisotropies{}, self_shadowing{};
 };
 
 class Resampler {
@@ -40,6 +44,8 @@ class Resampler {
   }
 
   Result<SourceVolume> run() {
+    if (source_.flakes)
+      return make_error(ErrorCode::Unsupported, "flakes on voxels that are no cubes; resample it to uniform voxels");
     FARFIELD_TRY(place());
     for (size_t i = 0; i < source_.bricks.size(); ++i) is_even_.push_back(is_even(source_.bricks[i]));
     FARFIELD_TRY(fill());
@@ -146,12 +152,19 @@ class Resampler {
     return {e % n.x, e / n.x % n.y, e / (n.x * n.y)};
   }
 
-  /// Albedos of even bricks may differ.
-  bool is_shared(uint32_t brick) const { return brick < kManyBricks && is_even_[brick] && source_.albedos.empty(); }
+  /// What else is in even bricks may differ.
+  bool is_shared(uint32_t brick) const {
+    const bool is_density_alone = source_.albedos.empty() && source_.shapes.empty() && source_.anisotropies.empty() &&
+                                  source_.self_shadowing.empty();
+    return brick < kManyBricks && is_even_[brick] && is_density_alone;
+  }
 
   uint32_t add(NewBrick&& brick) {
     out_.bricks.push_back(brick.densities);
     if (!source_.albedos.empty()) out_.albedos.push_back(brick.albedos);
+    if (!source_.shapes.empty()) out_.shapes.push_back(brick.shapes);
+    if (!source_.anisotropies.empty()) out_.anisotropies.push_back(brick.anisotropies);
+    if (!source_.self_shadowing.empty()) out_.self_shadowing.push_back(brick.self_shadowing);
     return static_cast<uint32_t>(out_.bricks.size() - 1);
   }
 
@@ -176,30 +189,58 @@ class Resampler {
     return is_empty ? std::nullopt : std::optional(made);
   }
 
+  /// A point of a cube that has a density.
+  struct Hit {
+    uint32_t brick;
+    size_t voxel;  ///< in it
+    double share;  ///< of the cube's density
+  };
+
   /// Whether there is anything in the cube.
   bool sample(const ivec3& voxel, size_t i, NewBrick& made) const {
     constexpr int kAll = kPoints * kPoints * kPoints;
+    std::array<Hit, kAll> hits;
+    size_t count = 0;
     double sum = 0;
-    dvec3 albedos(0.0);
     for (int point = 0; point < kAll; ++point) {
       const dvec3 offset(point % kPoints, point / kPoints % kPoints, point / (kPoints * kPoints));
       const ivec3 at = floor_to(source_point(dvec3(voxel) + (offset + 0.5) / double{kPoints}), source_.dims);
       if (glm::any(glm::lessThan(at, ivec3(0)))) continue;
       const uint32_t brick = source_.brick_at(at / kVolumeBrickSide);
       if (brick == kEmptyBrick) continue;
-      const size_t in_brick = index_in_brick(at);
-      const auto density = static_cast<double>(source_.bricks[brick][in_brick]);
+      const auto density = static_cast<double>(source_.bricks[brick][index_in_brick(at)]);
+      if (!(density > 0)) continue;
+      hits[count++] = {brick, index_in_brick(at), density};
       sum += density;
-      if (!source_.albedos.empty() && density > 0)
-        albedos += density * dvec3(unpack_albedo(source_.albedos[brick][in_brick]));
     }
-    if (!(sum > 0)) return false;
+    if (count == 0) return false;
+    for (Hit& hit : std::span(hits.data(), count)) hit.share /= sum;
     made.densities[i] = static_cast<float>(sum / kAll);
-    for (int c = 0; c < 3; ++c) {
-      made.albedos[i][static_cast<size_t>(c)] =
-          static_cast<uint16_t>(std::lround(65535.0 * std::clamp(albedos[c] / sum, 0.0, 1.0)));
-    }
+    mix(std::span(hits.data(), count), i, made);
     return true;
+  }
+
+  void mix(std::span<const Hit> hits, size_t i, NewBrick& made) const {
+    const auto mean = [&](const auto& value) {
+      double sum = 0;
+      for (const Hit& hit : hits) sum += hit.share * static_cast<double>(value(hit));
+      return sum;
+    };
+    for (size_t c = 0; c < 3 && !source_.albedos.empty(); ++c) {
+      made.albedos[i][c] =
+          static_cast<uint16_t>(std::lround(mean([&](const Hit& h) { return source_.albedos[h.brick][h.voxel][c]; })));
+    }
+    for (size_t e = 0; e < 6 && !source_.shapes.empty(); ++e) {
+      made.shapes[i][e] = static_cast<float>(mean([&](const Hit& h) { return source_.shapes[h.brick][h.voxel][e]; }));
+    }
+    if (!source_.anisotropies.empty()) {
+      made.anisotropies[i] =
+          static_cast<float>(mean([&](const Hit& h) { return source_.anisotropies[h.brick][h.voxel]; }));
+    }
+    if (!source_.self_shadowing.empty()) {
+      made.self_shadowing[i] =
+          static_cast<float>(mean([&](const Hit& h) { return source_.self_shadowing[h.brick][h.voxel]; }));
+    }
   }
 
   /// The sum of all densities, and in `active` how many there are.

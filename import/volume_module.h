@@ -28,7 +28,7 @@ struct VolumeModule {
 };
 
 /// A change of the types above, or of those that they name, takes the next number.
-inline constexpr const char* kVolumeModuleEntry = "farfield_volume_module_3";
+inline constexpr const char* kVolumeModuleEntry = "farfield_volume_module_4";
 
 /// The module, loaded at the first call and never unloaded. Any thread. Errors: Io (it is missing or cannot be loaded;
 /// later calls say the same).

@@ -11,6 +11,7 @@
 #include "base/hash.h"
 #include "base/parallel.h"
 #include "prefilter/fixed_sum.h"
+#include "prefilter/fog_shape.h"
 #include "prefilter/isotropic_lines.h"
 #include "prefilter/match_lines.h"
 #include "prefilter/voxel_ratios.h"  // SourceAndMedium
@@ -71,7 +72,9 @@ class FogMatcher {
   double source_depth(const VoxelRay& ray) const {
     double depth = 0;
     walk_grid(source_, 1, ray, [&](uint32_t brick, size_t voxel, double length) {
-      depth += static_cast<double>(source_.bricks[brick][voxel]) * length;
+      const float density = source_.bricks[brick][voxel];
+      if (density > 0)
+        depth += static_cast<double>(density) * length * source_sigma(source_, brick, voxel, ray.direction);
     });
     return depth * source_.voxel_size;
   }
@@ -81,8 +84,9 @@ class FogMatcher {
   void visit_depths(const VoxelRay& ray, const Visit& visit) const {
     walk_grid(level_, side_, ray, [&](uint32_t brick, size_t voxel, double length) {
       const float density = level_.bricks[brick][voxel];
-      if (density > 0)
-        visit(brick * kVolumeBrickVoxels + voxel, static_cast<double>(density) * length * source_.voxel_size);
+      if (!(density > 0)) return;
+      const double depth = static_cast<double>(density) * length * source_.voxel_size;
+      visit(brick * kVolumeBrickVoxels + voxel, depth * source_sigma(level_, brick, voxel, ray.direction));
     });
   }
 

@@ -9,6 +9,7 @@
 #include "bake/pack_fog.h"
 #include "base/parallel.h"
 #include "cache/level_file.h"
+#include "cache/level_values.h"
 #include "cache/verify.h"
 #include "import/read_volume.h"
 #include "tests/support/files.h"
@@ -194,6 +195,32 @@ TEST_F(BakeVolume, OnlyTheChannelsThatAreNeededAreStored) {
   volume.albedos.resize(volume.bricks.size());
   for (AlbedoBrick& brick : volume.albedos) brick.fill({1000, 30000, 65535});
   EXPECT_EQ(pack_source_fog(volume).value().voxel_albedo.size(), voxel_count(grey));
+}
+
+TEST_F(BakeVolume, CoarserLevelsOfFlakesAreFlakes) {
+  SourceVolume volume = test::make_volume(ivec3(16), 0.25, [](const ivec3&) { return 1.0; });
+  SourceFlakes& flakes = volume.flakes.emplace();
+  flakes.hot_spot = 0.5f;
+  flakes.diffuse.resize(volume.bricks.size());
+  for (ColorBrick& brick : flakes.diffuse)
+    for (size_t i = 0; i < brick.size(); ++i) brick[i] = vec3(i % 2 == 0 ? 0.25f : 0.75f, 1, 0);
+  volume.shapes.assign(volume.bricks.size(), ShapeBrick());
+  for (ShapeBrick& brick : volume.shapes) brick.fill({0.5f, 0.25f, 0.25f, 0, 0, 0});
+  volume.self_shadowing.assign(volume.bricks.size(), NumberBrick());
+  for (NumberBrick& brick : volume.self_shadowing) brick.fill(0.5f);
+  for (const Downsampling method : {Downsampling::Linear, Downsampling::Matched}) {
+    const LevelData level = pack_fog(volume, 2, method).value();
+    EXPECT_EQ(level.header.medium, Medium::Flakes);
+    EXPECT_EQ(level.header.hot_spot, 0.5f);
+    ASSERT_EQ(voxel_count(level), 64u);
+    const FlakeParams params = flake_params(view_of(level), 21);
+    EXPECT_NEAR(params.diffuse.x, 0.5, 0.01);
+    EXPECT_EQ(params.diffuse.y, 1.0f);
+    EXPECT_NEAR(params.self_shadowing, 0.5, 0.01);
+    EXPECT_NEAR(params.sggx.yy, 0.5, 0.01);
+    EXPECT_NEAR(level.bricks[0].density_scale, std::sqrt(0.5f), 0.02);  // along the largest axis
+    EXPECT_TRUE(level.voxel_albedo.empty() && level.voxel_anisotropy.empty());
+  }
 }
 
 TEST_F(BakeVolume, DensitiesKeepTheirSums) {

@@ -107,15 +107,15 @@ TEST(ResampleVolume, EvenFogStaysEven) {
 
 TEST(ResampleVolume, TilesStillShareBricks) {
   SourceVolume tile = test::make_volume(ivec3(8), 1, [](const ivec3&) { return 0.5; });
-  tile.dims = ivec3(256);
-  tile.brick_dims = ivec3(32);
-  tile.brick_table.assign(size_t{32} * 32 * 32, 0);
-  tile.active_voxels = uint64_t{256} * 256 * 256;
+  tile.dims = ivec3(128);
+  tile.brick_dims = ivec3(16);
+  tile.brick_table.assign(size_t{16} * 16 * 16, 0);
+  tile.active_voxels = uint64_t{128} * 128 * 128;
   const SourceVolume cubes = resampled(tile, shape_of({1, 0, 0}, {0, 1, 0}, {0, 0, 3}));
-  EXPECT_EQ(cubes.dims, ivec3(256, 256, 768));
+  EXPECT_EQ(cubes.dims, ivec3(128, 128, 384));
   EXPECT_EQ(cubes.active_voxels, 3 * tile.active_voxels);
-  EXPECT_EQ(cubes.filled_bricks, 3u * 32 * 32 * 32);
-  EXPECT_LT(cubes.bricks.size(), cubes.filled_bricks / 4);  // those at the border are their own
+  EXPECT_EQ(cubes.filled_bricks, 3u * 16 * 16 * 16);
+  EXPECT_LT(cubes.bricks.size(), cubes.filled_bricks / 2);  // those at the border are their own
 }
 
 TEST(ResampleVolume, AlbedosAreWeightedByDensity) {
@@ -130,6 +130,24 @@ TEST(ResampleVolume, AlbedosAreWeightedByDensity) {
   EXPECT_NEAR(albedo.x, 0.75, 1e-4);
   EXPECT_EQ(albedo.y, 1.0f);
   EXPECT_NEAR(albedo.z, 0.175, 1e-4);
+}
+
+TEST(ResampleVolume, KeepsShapesAndPhaseFunctions) {
+  SourceVolume volume = test::make_volume(ivec3(2, 1, 1), 1, [](const ivec3&) { return 1.0; });
+  volume.shapes.resize(1);
+  volume.anisotropies.resize(1);
+  volume.self_shadowing.resize(1);
+  volume.shapes[0][0] = {0.5f, 0.25f, 0.25f, 0.1f, 0, 0};
+  volume.shapes[0][1] = {0.25f, 0.5f, 0.25f, 0.1f, 0, 0};
+  volume.anisotropies[0][0] = 0.5f, volume.self_shadowing[0][0] = volume.self_shadowing[0][1] = 0.75f;
+  const SourceVolume cubes = resampled(volume, shape_of({1.5, 0, 0}, {0, 1, 0}, {0, 0, 1}));
+  EXPECT_EQ(cubes.shapes[0][0], volume.shapes[0][0]);
+  EXPECT_NEAR(cubes.shapes[0][1][0], 0.375f, 1e-6f);
+  EXPECT_NEAR(cubes.shapes[0][1][3], 0.1f, 1e-6f);
+  EXPECT_NEAR(cubes.anisotropies[0][1], 0.25f, 1e-6f);
+  EXPECT_NEAR(cubes.self_shadowing[0][2], 0.75f, 1e-6f);
+  volume.flakes.emplace();
+  EXPECT_FALSE(resample_to_cubes(volume, sheared_shape()));
 }
 
 TEST(ResampleVolume, DoesNotDependOnThreads) {
