@@ -142,7 +142,7 @@ BlockLight follow(const Medium& medium, const BlockRays& rays) {
     while (stop.is_hit() && events < kMostEvents) {
       throughput *= dvec3(medium.albedo(stop.voxel));
       line = {stop.point, scattered(line.direction, medium.phase(stop.voxel, rays.anisotropy), rng)};
-      if (events == 0) {
+      if (events == 0 && rays.with_single) {
         const double through = weight * std::exp(-medium.stop(line, kInfinity).depth);
         light.single += through * throughput;
         light.single_if_white += through;
@@ -152,8 +152,12 @@ BlockLight follow(const Medium& medium, const BlockRays& rays) {
     }
     left += weight * throughput;
     cosines += weight * throughput.y * glm::dot(came, line.direction);
-    if (light.events.size() < events) light.events.resize(events, 0.0);
+    if (light.events.size() < events) {
+      light.events.resize(events, 0.0);
+      light.event_cosines.resize(events, 0.0);
+    }
     light.events[events - 1] += weight;
+    light.event_cosines[events - 1] += weight * glm::dot(came, line.direction);
   }
   light.single /= count;
   light.single_if_white /= count;
@@ -161,6 +165,7 @@ BlockLight follow(const Medium& medium, const BlockRays& rays) {
   light.albedo = left / stopped;
   light.cosine = left.y > 0 ? cosines / left.y : 0;
   for (double& share : light.events) share /= stopped;
+  for (double& cosine : light.event_cosines) cosine /= stopped;
   return light;
 }
 
@@ -208,6 +213,16 @@ FogParams FogBlock::phase(const ivec3& voxel, float anisotropy) const {
   phase.has_shape = !source_.shapes.empty();
   if (phase.has_shape) phase.sggx = source_shape(source_, brick, index_in_brick(at));
   return phase;
+}
+
+double BlockLight::cosine_for(double cube_albedo) const {
+  double throughput = 1, left = 0, cosine_sum = 0;
+  for (size_t n = 0; n < events.size(); ++n) {
+    throughput *= cube_albedo;
+    left += throughput * events[n];
+    cosine_sum += throughput * event_cosines[n];
+  }
+  return left > 0 ? cosine_sum / left : 0.0;
 }
 
 BlockLight follow_light(const FogBlock& block, const BlockRays& rays) { return follow(BlockMedium(block), rays); }

@@ -69,17 +69,22 @@ struct FogCube {
 
 /// Means over all rays that enter.
 struct BlockLight {
-  dvec3 single{0.0};           ///< share that leaves after exactly one event
-  double single_if_white = 0;  ///< the same for albedo 1
-  dvec3 albedo{1.0};           ///< throughput of what is scattered at all, when it leaves: the effective albedo
-  double cosine = 0;           ///< between how light came and how it leaves, of what is scattered at all
-  std::vector<double> events;  ///< share of what is scattered at all that has n events, n = 1, ...: of cubes
+  dvec3 single{0.0};                  ///< share that leaves after exactly one event
+  double single_if_white = 0;         ///< the same for albedo 1
+  dvec3 albedo{1.0};                  ///< throughput of what is scattered at all, when it leaves: the effective albedo
+  double cosine = 0;                  ///< between how light came and how it leaves, of what is scattered at all
+  std::vector<double> events;         ///< share of what is scattered at all that has n events, n = 1, ...: of cubes
+  std::vector<double> event_cosines;  ///< the same, times the mean cosine of these
+
+  /// The cosine that a cube of another albedo would have: its light takes the same ways.
+  double cosine_for(double cube_albedo) const;
 };
 
 struct BlockRays {
   uint32_t count = 0;  ///< rounded up to a multiple of 6: the directions along the axes
   uint64_t seed = 0;
-  float anisotropy = 0;  ///< g
+  float anisotropy = 0;     ///< g
+  bool with_single = true;  ///< whether single scattering is wanted, too
 };
 
 BlockLight follow_light(const FogBlock& block, const BlockRays& rays);

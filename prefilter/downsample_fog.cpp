@@ -24,8 +24,9 @@ namespace {
 constexpr double kLeastEffect = 1e-3;
 constexpr double kLeastDifference = 0.01;  ///< of depths, by which a block must differ from its even spread
 constexpr double kMostBackward = 0.9;      ///< g of the other sign: nearly all light goes back
+constexpr double kCosineSlope = 0.8;       ///< of the mean cosine over g, about: where the search starts
 constexpr double kLeastShare = 1e-3;       ///< of single scattering, and of an axis's attenuation by the largest
-constexpr uint32_t kRaysPerArea = 24, kMostRays = 1024;  ///< rays for each fine voxel that a side shows
+constexpr uint32_t kRaysPerArea = 8, kMostRays = 512;  ///< rays for each fine voxel that a side shows
 
 /// -log of the mean of exp(-depth): finite and exact to a few roundings, however large or small the depths are.
 double depth_of_columns(const std::vector<double>& depths) {
@@ -193,22 +194,22 @@ bool differs_from_cube(const BlockSums& sums, int side, double depth) {
   return sums.largest * side > kLeastEffect && std::abs(even_depth - of_cube) > kLeastDifference * of_cube;
 }
 
-/// The g with which the cube sends light back as much as the block does: its mean cosine rises with g.
-float anisotropy_of(double cosine, const FogCube& cube, BlockRays rays) {
-  double low = -kMostBackward, high = std::max(0.0, static_cast<double>(rays.anisotropy));
-  const auto excess = [&](double g) {
+/// The g with which the cube sends light back as much as the block does: its mean cosine rises with g. `white`: the
+/// light of the white cube with the g of the rays.
+float anisotropy_of(double cosine, const BlockLight& white, const FogCube& cube, BlockRays rays) {
+  const auto cosine_at = [&](double g) {
     rays.anisotropy = static_cast<float>(g);
-    return follow_light(cube, rays).cosine - cosine;
+    return follow_light(cube, rays).cosine;
   };
-  double at_high = excess(high);
+  const double high = std::max(0.0, static_cast<double>(rays.anisotropy));
+  const bool is_known = rays.anisotropy >= 0;
+  const double at_high = (is_known ? white.cosine_for(static_cast<double>(cube.albedo.y)) : cosine_at(high)) - cosine;
   if (at_high <= 0) return static_cast<float>(high);
-  double at_low = excess(low);
-  if (at_low >= 0) return static_cast<float>(low);
-  // The cosine is nearly straight in g: one point between, and the root on the chord that has it.
-  const double g = low + (high - low) * -at_low / (at_high - at_low), at_g = excess(g);
-  (at_g > 0 ? high : low) = g;
-  (at_g > 0 ? at_high : at_low) = at_g;
-  return static_cast<float>(low + (high - low) * -at_low / (at_high - at_low));
+  // The cosine is nearly straight in g: a guess, and the root of the line through both.
+  const double guess = std::max(high - at_high / kCosineSlope, -kMostBackward), at_guess = cosine_at(guess) - cosine;
+  if (!(at_high > at_guess)) return static_cast<float>(guess);
+  const double root = guess - at_guess * (high - guess) / (at_high - at_guess);
+  return static_cast<float>(std::clamp(root, -kMostBackward, high));
 }
 
 /// An ellipsoid that stops, along the axes, what the block stops.
@@ -357,11 +358,13 @@ FogVoxel FogDownsampler::voxel(const ivec3& coordinate, float density) const {
   if (!differs_from_cube(sums, side, depth)) return voxel;
   BlockRays rays = block_rays(coordinate);
   rays.anisotropy = voxel.anisotropy;
+  rays.with_single = false;
   const BlockLight of_block = follow_light(block, rays);
   FogCube cube{depth, side, vec3(1.0f), !source_.shapes.empty(), sums.shape};
-  if (min_component(sums.darkest) < 1) set_albedo(sums.albedo, of_block, follow_light(cube, rays), voxel);
+  const BlockLight of_white = follow_light(cube, rays);
+  if (min_component(sums.darkest) < 1) set_albedo(sums.albedo, of_block, of_white, voxel);
   cube.albedo = !has_own_albedos(source_) ? cluster_albedo(voxel.albedo, voxel.self_shadowing) : voxel.albedo;
-  voxel.anisotropy = anisotropy_of(of_block.cosine, cube, rays);
+  voxel.anisotropy = anisotropy_of(of_block.cosine, of_white, cube, rays);
   return voxel;
 }
 
