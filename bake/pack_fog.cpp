@@ -8,7 +8,13 @@
 #include <vector>
 
 #include "bake/pack_arrays.h"
+#include "bake/pack_colors.h"
 #include "base/parallel.h"
+#include "prefilter/fog_shape.h"
+#include "scattering/highlight_lean.h"
+#include "scattering/hot_spot.h"
+#include "scattering/open_side.h"
+#include "scattering/sggx.h"
 #include "scattering/sggx_codec.h"
 
 namespace farfield {
@@ -23,6 +29,7 @@ struct PackedFog {
   std::vector<uint8_t> self_shadowing;
   std::vector<int8_t> anisotropy;
   std::vector<PackedFlakeSggx> shape;
+  std::vector<FlakeLook> flakes;
 };
 
 /// Densities as bytes. Homogeneous bricks are exact.
@@ -40,7 +47,7 @@ void pack_densities(const FogVoxels& voxels, Brick& brick) {
   sum_up_mask(brick);
 }
 
-PackedFog pack_brick(const FogVoxels& voxels) {
+PackedFog pack_brick(const FogVoxels& voxels, bool has_flakes) {
   PackedFog packed;
   pack_densities(voxels, packed.brick);
   for (size_t i = 0; i < voxels.size(); ++i) {
@@ -49,6 +56,7 @@ PackedFog pack_brick(const FogVoxels& voxels) {
     packed.self_shadowing.push_back(std::max<uint8_t>(pack_unorm8(voxels[i].self_shadowing), 1));
     packed.anisotropy.push_back(pack_anisotropy(voxels[i].anisotropy));
     packed.shape.push_back(pack_flake_sggx(voxels[i].shape));
+    if (has_flakes) packed.flakes.push_back(voxels[i].flakes);
   }
   return packed;
 }
@@ -63,6 +71,49 @@ struct FogChannels {
   bool albedo = false, self_shadowing = false, shape = false, anisotropy = false;
 };
 
+/// What holds for all of a level's voxels.
+void set_medium(const SourceVolume& source, LevelHeader& header) {
+  if (!source.flakes) {
+    header.medium = Medium::Fog;
+    header.fog_albedo = source.albedo;
+    header.fog_anisotropy = source.anisotropy;
+    return;
+  }
+  const SourceFlakes& flakes = *source.flakes;
+  header.medium = Medium::Flakes;
+  header.hot_spot = std::clamp(flakes.hot_spot, 0.0f, kStrongestHotSpot);
+  header.highlight_lean = std::clamp(flakes.highlight_lean, -kMostHighlightLean, kMostHighlightLean);
+  const float length = glm::length(flakes.open_side);
+  header.open_side = length > kMostOpenSide ? flakes.open_side * (kMostOpenSide / length) : flakes.open_side;
+}
+
+template <typename T, typename Pack>
+std::vector<T> pack_each(const std::vector<FlakeLook>& looks, const Pack& pack) {
+  std::vector<T> packed;
+  packed.reserve(looks.size());
+  for (const FlakeLook& look : looks) packed.push_back(pack(look));
+  return packed;
+}
+
+/// As pack_volume() has them of surfaces' flakes.
+void pack_looks(const std::vector<FlakeLook>& looks, LevelData& level) {
+  level.voxel_diffuse = pack_colors(looks, [](const FlakeLook& look) { return look.diffuse; });
+  level.voxel_specular = pack_colors(looks, [](const FlakeLook& look) { return look.specular; });
+  level.voxel_transmission = pack_colors(looks, [](const FlakeLook& look) { return look.transmission; });
+  level.voxel_emission = pack_each<PackedRadiance>(looks, [](const FlakeLook& l) { return pack_radiance(l.emission); });
+  level.voxel_octants = pack_each<PackedOctants>(looks, [](const FlakeLook& look) { return look.octants; });
+  drop_if_all(level.voxel_diffuse, PackedColor{});
+  drop_if_all(level.voxel_specular, PackedColor{});
+  drop_if_all(level.voxel_transmission, PackedColor{});
+  drop_if_all(level.voxel_emission, PackedRadiance{});
+  drop_if_all(level.voxel_octants, kFullOctants);
+  if (level.voxel_specular.empty()) return;
+  level.voxel_roughness2 = pack_each<uint8_t>(looks, [](const FlakeLook& look) {
+    const float alpha = look.roughness * look.roughness;
+    return pack_unorm8(alpha * alpha);
+  });
+}
+
 /// Makes a level from its bricks. voxels_of(brick, voxels): false where the brick is empty; called from many threads.
 template <typename VoxelsOf>
 Result<LevelData> pack_bricks(const SourceVolume& source, const ivec3& dims, double voxel_size,
@@ -70,14 +121,13 @@ Result<LevelData> pack_bricks(const SourceVolume& source, const ivec3& dims, dou
   constexpr size_t kBatch = 4096;  // bricks that are in memory in full before they join the level
   LevelData level;
   level.header.resolution = static_cast<float>(voxel_size);
-  level.header.medium = Medium::Fog;
-  level.header.fog_albedo = source.albedo;
-  level.header.fog_anisotropy = source.anisotropy;
+  set_medium(source, level.header);
   level.header.brick_dims = (dims + (kBrickSide - 1)) / kBrickSide;
   const ivec3& n = level.header.brick_dims;
   const size_t entries = static_cast<size_t>(n.x) * static_cast<size_t>(n.y) * static_cast<size_t>(n.z);
   level.brick_table.assign(entries, kNoBrick);
   std::vector<PackedFog> batch(std::min(kBatch, entries));
+  std::vector<FlakeLook> looks;
   uint32_t payload_base = 0;
   for (size_t first = 0; first < entries; first += kBatch) {
     if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, "bake: cancelled");
@@ -88,7 +138,7 @@ Result<LevelData> pack_bricks(const SourceVolume& source, const ivec3& dims, dou
       for (size_t i = begin; i < end; ++i) {
         batch[i] = PackedFog();
         if (job.is_cancelled() || !voxels_of(brick_coordinates(level.header, first + i), *voxels)) continue;
-        batch[i] = pack_brick(*voxels);
+        batch[i] = pack_brick(*voxels, source.flakes.has_value());
       }
     });
     for (size_t i = 0; i < count; ++i) {
@@ -102,6 +152,7 @@ Result<LevelData> pack_bricks(const SourceVolume& source, const ivec3& dims, dou
       if (channels.self_shadowing) append(level.voxel_self_shadowing, packed.self_shadowing);
       if (channels.anisotropy) append(level.voxel_anisotropy, packed.anisotropy);
       if (channels.shape) append(level.voxel_sggx, packed.shape);
+      append(looks, packed.flakes);
     }
   }
   if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, "bake: cancelled");
@@ -109,6 +160,7 @@ Result<LevelData> pack_bricks(const SourceVolume& source, const ivec3& dims, dou
   drop_if_all(level.voxel_self_shadowing, uint8_t{255});
   drop_if_all(level.voxel_anisotropy, pack_anisotropy(source.anisotropy));
   drop_if_all(level.voxel_sggx, pack_flake_sggx(SymMat3::identity()));
+  if (source.flakes) pack_looks(looks, level);
   for_each_brick(level, [&](const Brick& brick, const ivec3& coordinates) {
     const Box3 voxels = active_box(brick);
     const dvec3 corner = dvec3(coordinates * kBrickSide);
@@ -118,17 +170,44 @@ Result<LevelData> pack_bricks(const SourceVolume& source, const ivec3& dims, dou
   return level;
 }
 
+FlakeLook source_look(const SourceFlakes& flakes, uint32_t brick, size_t i) {
+  const auto color = [&](const std::vector<ColorBrick>& colors) {
+    return colors.empty() ? vec3(0.0f) : colors[brick][i];
+  };
+  FlakeLook look{color(flakes.diffuse), color(flakes.specular), color(flakes.transmission), color(flakes.emission)};
+  look.roughness = flakes.roughness.empty() ? 1.0f : flakes.roughness[brick][i];
+  if (!flakes.octants.empty() && mean_share(flakes.octants[brick][i]) > 0) look.octants = flakes.octants[brick][i];
+  return look;
+}
+
+/// A voxel of level 0.
+FogVoxel source_voxel(const SourceVolume& source, uint32_t brick, size_t i) {
+  FogVoxel voxel;
+  voxel.density = source.bricks[brick][i];
+  voxel.albedo = source.albedos.empty() ? source.albedo : unpack_albedo(source.albedos[brick][i]);
+  voxel.anisotropy = source.anisotropies.empty() ? source.anisotropy : source.anisotropies[brick][i];
+  if (!source.self_shadowing.empty()) voxel.self_shadowing = source.self_shadowing[brick][i];
+  if (!source.shapes.empty() && voxel.density > 0) {
+    const NormalisedSggx s = normalise_sggx(source_shape(source, brick, i));
+    voxel.density *= s.rho_factor;
+    voxel.shape = s.sggx;
+  }
+  if (!source.flakes) return voxel;
+  voxel.flakes = source_look(*source.flakes, brick, i);
+  voxel.density /= mean_share(voxel.flakes.octants);
+  return voxel;
+}
+
 }  // namespace
 
 Result<LevelData> pack_source_fog(const SourceVolume& source, const Job& job) {
-  const FogChannels channels{.albedo = !source.albedos.empty()};
+  const bool is_fog = !source.flakes;
+  const FogChannels channels{is_fog && !source.albedos.empty(), !source.self_shadowing.empty(), !source.shapes.empty(),
+                             is_fog && !source.anisotropies.empty()};
   const auto voxels_of = [&](const ivec3& brick, FogVoxels& voxels) {
     const uint32_t index = source.brick_table[source.table_index(brick)];
     if (index == kEmptyBrick) return false;
-    for (size_t i = 0; i < voxels.size(); ++i) {
-      voxels[i].density = source.bricks[index][i];
-      voxels[i].albedo = source.albedos.empty() ? source.albedo : unpack_albedo(source.albedos[index][i]);
-    }
+    for (size_t i = 0; i < voxels.size(); ++i) voxels[i] = source_voxel(source, index, i);
     return true;
   };
   return pack_bricks(source, source.dims, source.voxel_size, channels, job, voxels_of);
@@ -136,8 +215,11 @@ Result<LevelData> pack_source_fog(const SourceVolume& source, const Job& job) {
 
 Result<LevelData> pack_fog(const SourceVolume& source, uint32_t level, Downsampling method, const Job& job) {
   const FogDownsampler downsampler(source, level, method);
-  const FogChannels channels{!source.albedos.empty(), method != Downsampling::Linear, method == Downsampling::Aniso,
-                             method == Downsampling::Matched};
+  const bool is_fog = !source.flakes, has_anisotropies = !source.anisotropies.empty();
+  const FogChannels channels{is_fog && (has_own_albedos(source) || has_anisotropies),
+                             is_fog ? method != Downsampling::Linear : !source.self_shadowing.empty(),
+                             method == Downsampling::Aniso || !source.shapes.empty(),
+                             is_fog && (method == Downsampling::Matched || has_anisotropies)};
   DensityGrid matched;
   if (method == Downsampling::Matched) {
     FARFIELD_TRY_LET(matched, matched_densities(source, level, job.step("", 0, 0.5)));

@@ -8,6 +8,7 @@
 
 #include "base/hash.h"
 #include "import/read_volume.h"
+#include "import/resample_volume.h"
 #include "import/voxel_shape.h"
 
 namespace farfield {
@@ -30,7 +31,11 @@ class VolumeGatherer {
     if (job_.is_cancelled()) return cancelled();
     set_light();
     out_.source_hash = hash();
-    return std::move(out_);
+    if (shape_.is_cube()) return std::move(out_);
+    auto cubes = resample_to_cubes(out_, shape_, job_);
+    if (!cubes && cubes.error().code == ErrorCode::Unsupported) return error("{}", cubes.error().message);
+    if (cubes) cubes->warnings.push_back(fmt::format("volume {}: {}", given_.name, resampling_text(shape_)));
+    return cubes;
   }
 
  private:
@@ -61,13 +66,11 @@ class VolumeGatherer {
 
   Result<void> place() {
     const glm::dmat4x3& m = given_.to_asset;
-    const VoxelShape shape = voxel_shape({m[0], m[1], m[2]});
+    shape_ = voxel_shape({m[0], m[1], m[2]});
     const bool is_placed = std::isfinite(m[3].x) && std::isfinite(m[3].y) && std::isfinite(m[3].z);
-    if (shape.is_singular || !is_placed) return error("to_asset is singular or not finite");
-    if (!shape.is_cube())
-      return error("to_asset makes voxels of {}: they must be cubes; resample the volume", shape.other_shape);
-    out_.voxel_size = shape.size;
-    out_.rotation = shape.rotation;
+    if (shape_.is_singular || !is_placed) return error("to_asset is singular or not finite");
+    out_.voxel_size = shape_.size;
+    out_.rotation = shape_.rotation;
     return {};
   }
 
@@ -180,6 +183,7 @@ class VolumeGatherer {
   const BakeFog& fog_;
   const Job& job_;
   const uvec3 dims_;
+  VoxelShape shape_;
   uvec3 lower_{0}, upper_{0};  ///< of what has a density
   SourceVolume out_;
 };

@@ -21,6 +21,7 @@ if(FARFIELD_BUILD_BAKE)
   # OpenVDB's own FindOpenVDB.cmake asks for Boost's and Blosc's development files, of which its headers need none here.
   find_path(OPENVDB_INCLUDE_DIR openvdb/openvdb.h REQUIRED)
   find_library(OPENVDB_LIBRARY openvdb REQUIRED)
+  find_path(NANOVDB_INCLUDE_DIR nanovdb/NanoVDB.h REQUIRED)
   # OpenSubdiv's own CMake config asks for its static libraries and for OpenGL's, which Debian's package does not bring.
   find_path(OPENSUBDIV_INCLUDE_DIR opensubdiv/bfr/surface.h REQUIRED)
   find_library(OPENSUBDIV_LIBRARY osdCPU REQUIRED)

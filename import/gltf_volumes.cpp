@@ -25,11 +25,12 @@ Result<void> read_property(const tinygltf::Value& extras, const std::string& key
   const auto number = extension_number(extras, key.c_str());
   if (key == "density_scale" && number) return volume.fog.density_scale = *number, Result<void>();
   if (key == "anisotropy" && number) return volume.fog.anisotropy = *number, Result<void>();
+  if (key == "fibre_roughness" && number) return volume.fog.fibre_roughness = *number, Result<void>();
   const auto color = extension_vec3(extras, key.c_str());
   if (key == "albedo" && color) return volume.fog.albedo = *color, Result<void>();
   return bad(
       fmt::format("\"{}\" is unknown or of the wrong type; file, density_grid, density_scale, albedo, "
-                  "anisotropy and level_set are read",
+                  "anisotropy, fibre_roughness and level_set are read",
                   key));
 }
 

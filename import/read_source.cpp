@@ -48,8 +48,10 @@ Result<SourceMesh> read_as_named(const Bytes& bytes, const fs::path& path, const
     return make_error(ErrorCode::Unsupported, fmt::format("{}: a volume, where a surface is wanted", path.string()));
   }
   if (extension == ".nvdb" || extension == ".vol") {
-    return make_error(ErrorCode::Unsupported,
-                      fmt::format("{}: of volumes OpenVDB files (.vdb) are read; convert it", path.string()));
+    return make_error(
+        ErrorCode::Unsupported,
+        fmt::format("{}: of volumes OpenVDB and NanoVDB files (.vdb, .nvdb) are read, not gzipped; convert it",
+                    path.string()));
   }
   return make_error(
       ErrorCode::Unsupported,

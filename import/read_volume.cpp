@@ -8,10 +8,12 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <string_view>
 
 #include "base/file_io.h"
 #include "base/hash.h"
 #include "base/text.h"
+#include "import/resample_volume.h"
 #include "import/volume_module.h"
 
 namespace farfield {
@@ -20,6 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array<char, 8> kVdbMagic = {' ', 'B', 'D', 'V', 0, 0, 0, 0};
+constexpr std::string_view kNanoVdbMagic = "NanoVDB";  ///< and a digit
 
 Result<void> check_exists(const fs::path& path) {
   std::error_code error;
@@ -27,6 +30,16 @@ Result<void> check_exists(const fs::path& path) {
   if (!fs::exists(status)) return make_error(ErrorCode::NotFound, fmt::format("{}: no such file", path.string()));
   if (fs::is_regular_file(status)) return {};
   return make_error(ErrorCode::Io, fmt::format("{}: is not a regular file", path.string()));
+}
+
+Result<SourceVolume> on_cubes(const fs::path& path, VolumeOnLattice&& read, const Job& job) {
+  if (read.shape.is_cube()) return std::move(read.volume);
+  auto cubes = resample_to_cubes(read.volume, read.shape, job);
+  if (!cubes && cubes.error().code == ErrorCode::Unsupported)
+    return make_error(cubes.error().code, fmt::format("{}: {}", path.string(), cubes.error().message));
+  FARFIELD_TRY_LET(auto volume, std::move(cubes));
+  volume.warnings.push_back(fmt::format("{}: {}", path.string(), resampling_text(read.shape)));
+  return volume;
 }
 
 }  // namespace
@@ -37,6 +50,8 @@ Result<void> check_options(const FogOptions& options) {
     return invalid(fmt::format("--density-scale must be above 0 and finite, not {}", options.density_scale));
   if (!(std::abs(options.anisotropy) <= kMostAnisotropy))
     return invalid(fmt::format("--anisotropy must be from -{0} to {0}, not {1}", kMostAnisotropy, options.anisotropy));
+  if (!(options.fibre_roughness >= 0 && options.fibre_roughness <= 1))
+    return invalid(fmt::format("--fibre-roughness must be from 0 to 1, not {}", options.fibre_roughness));
   if (!options.albedo) return {};
   const vec3& albedo = *options.albedo;
   if (!is_finite(albedo) || min_component(albedo) < 0 || max_component(albedo) > 1)
@@ -51,6 +66,7 @@ std::string canonical_text(const FogOptions& options) {
   if (options.albedo) text += fmt::format(" albedo={},{},{}", options.albedo->x, options.albedo->y, options.albedo->z);
   if (options.anisotropy != 0) text += fmt::format(" anisotropy={}", options.anisotropy);
   if (options.level_set) text += " level_set=1";
+  if (options.fibre_roughness != kFibreRoughness) text += fmt::format(" fibre_roughness={}", options.fibre_roughness);
   return text;
 }
 
@@ -62,8 +78,10 @@ uint64_t hash_of(const FogOptions& options) {
 bool is_volume_file(const fs::path& path) {
   std::array<char, 8> start{};
   std::ifstream stream(path, std::ios::binary);
-  if (stream.read(start.data(), start.size())) return start == kVdbMagic;
-  return lower_case(path.extension().string()) == ".vdb";
+  if (stream.read(start.data(), start.size()))
+    return start == kVdbMagic || std::string_view(start.data(), kNanoVdbMagic.size()) == kNanoVdbMagic;
+  const std::string extension = lower_case(path.extension().string());
+  return extension == ".vdb" || extension == ".nvdb";
 }
 
 Result<VolumeExtent> read_volume_extent(const fs::path& path, const FogOptions& options) {
@@ -77,7 +95,8 @@ Result<SourceVolume> read_volume(const fs::path& path, const FogOptions& options
   FARFIELD_TRY(check_options(options));
   FARFIELD_TRY(check_exists(path));
   FARFIELD_TRY_LET(const VolumeModule* module, volume_module());
-  FARFIELD_TRY_LET(auto volume, module->read(path.string(), options, job));
+  FARFIELD_TRY_LET(auto read, module->read(path.string(), options, job));
+  FARFIELD_TRY_LET(auto volume, on_cubes(path, std::move(read), job));
   FARFIELD_TRY_LET(volume.source_hash, hash_volume(path, options));
   return volume;
 }

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reading OpenVDB files (.vdb): the density of a fog volume, with albedos if there are any.
+// Reading OpenVDB and NanoVDB files (.vdb, .nvdb): the density of a fog volume, with albedos if there are any.
 //
 // Grids: density is "density", or the only float grid that is a fog volume, or what the options name; float, half and
 // double. Albedos are a vec3 grid "albedo" or "Cd" (of "X_level_2": "albedo_level_2") on its lattice. Emission (flame)
 // is not modelled: as a density it is refused, beside one it is ignored and said to be. What else is there is ignored,
 // and said to be, too.
+//
+// Voxels that are no cubes are resampled (resample_volume.h), and said to be.
 //
 // OpenVDB's voxel (i, j, k) is a sample whose *centre* is where its transform puts (i, j, k): half a voxel is
 // subtracted once, here.
@@ -32,7 +34,7 @@ Result<VolumeExtent> read_volume_extent(const std::filesystem::path& path, const
 /// Memory: 2 KiB for each 8^3 voxels that hold any density (tiles share theirs), 4 bytes for each that the bounds
 /// enclose, and OpenVDB's own tree while it is read. Errors: NotFound, Io; BadFile (broken; densities that are negative
 /// by more than rounding, NaN or infinite: with the first such voxel; nothing with a density); Unsupported (no such
-/// grid, several to choose from, level sets without the option, voxels that are not cubes, emission, more voxels or a
+/// grid, several to choose from, level sets without the option, a frustum, emission, more voxels or a
 /// larger extent than a level can hold); InvalidArgument (options); Cancelled.
 Result<SourceVolume> read_volume(const std::filesystem::path& path, const FogOptions& options = {},
                                  const Job& job = {});

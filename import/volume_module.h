@@ -8,20 +8,27 @@
 #include "base/job.h"
 #include "base/result.h"
 #include "import/read_volume.h"
+#include "import/voxel_shape.h"
 #include "import/write_volume.h"
 
 namespace farfield {
+
+/// A file's grid as it is: voxels of `volume` have the shape `shape`, whose size and rotation it has.
+struct VolumeOnLattice {
+  SourceVolume volume;
+  VoxelShape shape;
+};
 
 /// What the module exports, under the name kVolumeModuleEntry. All from any thread; errors as read_volume() has them,
 /// but for options, which are right, and without the hash, and as write_volume() has them.
 struct VolumeModule {
   Result<VolumeExtent> (*read_extent)(const std::string& path, const FogOptions& options);
-  Result<SourceVolume> (*read)(const std::string& path, const FogOptions& options, const Job& job);
+  Result<VolumeOnLattice> (*read)(const std::string& path, const FogOptions& options, const Job& job);
   Result<void> (*write)(const std::string& path, const VolumeFile& file, const Job& job);
 };
 
 /// A change of the types above, or of those that they name, takes the next number.
-inline constexpr const char* kVolumeModuleEntry = "farfield_volume_module_2";
+inline constexpr const char* kVolumeModuleEntry = "farfield_volume_module_4";
 
 /// The module, loaded at the first call and never unloaded. Any thread. Errors: Io (it is missing or cannot be loaded;
 /// later calls say the same).

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The module farfield_volumes, and what reads OpenVDB files [Museth 2013]. Nothing of OpenVDB leaves this file; what it
-// throws ends here as an Error.
+// The module farfield_volumes, and what reads OpenVDB files [Museth 2013], or NanoVDB's by way of OpenVDB's grids.
+// Nothing of OpenVDB leaves this file; what it throws ends here as an Error.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetUtil.h>
@@ -11,10 +12,13 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "base/text.h"
 #include "farfield/export.h"
+#include "import/volume_channels_openvdb.h"
 #include "import/volume_module.h"
+#include "import/volume_nanovdb.h"
 #include "import/volume_write_openvdb.h"
 #include "import/voxel_shape.h"
 
@@ -25,23 +29,10 @@ using openvdb::Coord;
 using openvdb::CoordBBox;
 
 constexpr double kSmallNegative = 1e-3;  ///< of the largest density: what filters leave behind, not an error
-constexpr uint64_t kMostTableBricks = uint64_t{1} << 26;  ///< the table of a level takes 4 bytes for each
 constexpr std::array<const char*, 6> kEmissionNames = {"temperature", "heat", "flame", "flames", "fire", "emission"};
-constexpr std::array<const char*, 2> kAlbedoNames = {"albedo", "Cd"};
-
-std::string coordinate_text(const Coord& c) { return fmt::format("({}, {}, {})", c.x(), c.y(), c.z()); }
 
 bool is_emission(const std::string& name) {
   return std::ranges::find(kEmissionNames, lower_case(name)) != kEmissionNames.end();
-}
-
-/// "_level_3" of "density_level_3", a grid of several levels as OpenVDB's tools and ours name them; else nothing.
-std::string level_suffix(const std::string& name) {
-  constexpr std::string_view kMark = "_level_";
-  const size_t at = name.rfind(kMark);
-  const bool has_number = at != std::string::npos && at + kMark.size() < name.size() &&
-                          name.find_first_not_of("0123456789", at + kMark.size()) == std::string::npos;
-  return has_number ? name.substr(at) : "";
 }
 
 bool is_scalar(const openvdb::GridBase& grid) { return grid.valueType() == "float" || grid.valueType() == "double"; }
@@ -64,8 +55,7 @@ struct Contents {
 /// How a grid's lattice lies in the source's space.
 struct Lattice {
   openvdb::math::Mat4d index_to_source;
-  glm::dmat3 rotation{1.0};
-  double voxel_size = 0;
+  VoxelShape shape;
 
   /// index: in OpenVDB's sense, where voxels have their centres at whole numbers.
   dvec3 to_source(const openvdb::Vec3d& index) const {
@@ -89,7 +79,7 @@ class VdbReader {
     if (lower && upper) {
       box = CoordBBox(Coord(lower->value()), Coord(upper->value()));
     } else {  // written without statistics
-      box = file_.readGrid(grid->getName())->evalActiveVoxelBoundingBox();
+      box = load(grid->getName())->evalActiveVoxelBoundingBox();
     }
     if (box.empty()) return nothing_in(grid->getName());
     VolumeExtent extent{dvec3(INFINITY), dvec3(-INFINITY)};
@@ -103,23 +93,26 @@ class VdbReader {
     return extent;
   }
 
-  Result<SourceVolume> read() {
+  Result<VolumeOnLattice> read() {
     FARFIELD_TRY_LET(const auto header, open_density());
     FARFIELD_TRY_LET(const Lattice lattice, lattice_of(*header));
-    volume_.rotation = lattice.rotation;
-    volume_.voxel_size = lattice.voxel_size;
+    volume_.rotation = lattice.shape.rotation;
+    volume_.voxel_size = lattice.shape.size;
     volume_.anisotropy = static_cast<float>(options_.anisotropy);
     const std::string name = header->getName();
-    auto base = file_.readGrid(name);
+    auto base = load(name);
     if (job_.is_cancelled()) return cancelled();
     Result<void> done;
     if (auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(base)) done = take_density(*grid, lattice);
     if (auto grid = openvdb::gridPtrCast<openvdb::DoubleGrid>(base)) done = take_density(*grid, lattice);
     FARFIELD_TRY(std::move(done));
     base.reset();
-    FARFIELD_TRY(take_albedo(*header));
-    warn_of_the_rest(name);
-    return std::move(volume_);
+    used_ = {name};
+    FARFIELD_TRY(read_channels(
+        {path_, options_, [&](const std::string& grid) { return load(grid); }, contents_.grids, *header, first_voxel_},
+        volume_, used_));
+    warn_of_the_rest();
+    return VolumeOnLattice{std::move(volume_), lattice.shape};
   }
 
  private:
@@ -135,12 +128,39 @@ class VdbReader {
   // ---- which grid
 
   Result<openvdb::GridBase::Ptr> open_density() {
-    file_.open(/*delayLoad=*/false);
-    for (auto name = file_.beginName(); name != file_.endName(); ++name) {
-      contents_.grids.push_back(file_.readGridMetadata(name.gridName()));
+    if (is_nanovdb_file(path_)) {
+      FARFIELD_TRY(open_nanovdb());
+    } else {
+      file_.open(/*delayLoad=*/false);
+      for (auto name = file_.beginName(); name != file_.endName(); ++name) {
+        contents_.grids.push_back(file_.readGridMetadata(name.gridName()));
+      }
     }
     if (contents_.grids.empty()) return error(ErrorCode::BadFile, "there is no grid in it; was it cut short?");
     return choose_density();
+  }
+
+  /// All of its grids are in memory at once.
+  Result<void> open_nanovdb() {
+    auto read = read_nanovdb(path_);
+    if (!read) return error(read.error().code, "{}", read.error().message);
+    is_in_memory_ = true;
+    contents_.grids = std::move(read->grids);
+    for (const std::string& other : read->others) warn("a grid that is ignored: {}", other);
+    if (contents_.grids.empty()) {
+      return error(ErrorCode::Unsupported,
+                   "none of its grids is of float, double, Fp4, Fp8, Fp16 or Vec3f: {}; convert it to .vdb",
+                   fmt::join(read->others, ", "));
+    }
+    return {};
+  }
+
+  /// A grid with its voxels.
+  openvdb::GridBase::Ptr load(const std::string& name) {
+    if (!is_in_memory_) return file_.readGrid(name);
+    for (const auto& grid : contents_.grids)
+      if (grid->getName() == name) return grid;
+    return nullptr;
   }
 
   Result<openvdb::GridBase::Ptr> choose_density() const {
@@ -195,22 +215,15 @@ class VdbReader {
       return error(ErrorCode::Unsupported, "the grid \"{}\" lies in a frustum; resample it to a linear transform",
                    grid.getName());
     }
-    Lattice lattice{affine->getMat4()};
+    Lattice lattice{affine->getMat4(), {}};
     std::array<dvec3, 3> edges;
     for (int axis = 0; axis < 3; ++axis) {  // rows: OpenVDB's vectors stand on the left
       const auto& m = lattice.index_to_source;
       edges[static_cast<size_t>(axis)] = {m(axis, 0), m(axis, 1), m(axis, 2)};
     }
-    const VoxelShape shape = voxel_shape(edges);
-    if (shape.is_singular)
+    lattice.shape = voxel_shape(edges);
+    if (lattice.shape.is_singular)
       return error(ErrorCode::BadFile, "the transform of the grid \"{}\" is singular or not finite", grid.getName());
-    if (!shape.is_cube()) {
-      return error(ErrorCode::Unsupported,
-                   "voxels of the grid \"{}\" are {}: only cubes are read; resample it to uniform voxels",
-                   grid.getName(), shape.other_shape);
-    }
-    lattice.voxel_size = shape.size;
-    lattice.rotation = shape.rotation;
     return lattice;
   }
 
@@ -397,80 +410,6 @@ class VdbReader {
     return {};
   }
 
-  // ---- albedos
-
-  Result<void> take_albedo(const openvdb::GridBase& density) {
-    if (options_.albedo) {
-      volume_.albedo = *options_.albedo;
-      return {};
-    }
-    const std::string suffix = level_suffix(density.getName());
-    openvdb::GridBase::Ptr header;
-    for (const char* name : kAlbedoNames)
-      for (const auto& grid : contents_.grids)
-        if (!header && grid->getName() == name + suffix && grid->valueType() == "vec3s") header = grid;
-    if (!header) {
-      volume_.albedo = vec3(kDefaultAlbedo);
-      warn("it says no albedo: {} is taken, --albedo says another", kDefaultAlbedo);
-      return {};
-    }
-    albedo_name_ = header->getName();
-    if (header->transform() != density.transform()) {
-      return error(ErrorCode::Unsupported,
-                   "the grids \"{}\" and \"{}\" have other transforms; resample one, or give --albedo",
-                   density.getName(), albedo_name_);
-    }
-    const auto grid = openvdb::gridPtrCast<openvdb::Vec3SGrid>(file_.readGrid(albedo_name_));
-    if (!grid) return error(ErrorCode::BadFile, "the grid \"{}\" cannot be read as colours", albedo_name_);
-    return fill_albedos(*grid);
-  }
-
-  Result<void> fill_albedos(const openvdb::Vec3SGrid& grid) {
-    unshare_bricks();
-    volume_.albedos.resize(volume_.bricks.size());
-    const auto accessor = grid.getConstAccessor();
-    uint64_t clamped = 0;
-    for (size_t entry = 0; entry < volume_.brick_table.size(); ++entry) {
-      const uint32_t index = volume_.brick_table[entry];
-      if (index == kEmptyBrick) continue;
-      const auto e = static_cast<int>(entry);
-      const ivec3 n = volume_.brick_dims, brick(e % n.x, e / n.x % n.y, e / (n.x * n.y));
-      for (int i = 0; i < kVolumeBrickVoxels; ++i) {
-        const auto voxel = static_cast<size_t>(i);
-        if (!(volume_.bricks[index][voxel] > 0)) continue;
-        const Coord at =
-            first_voxel_ + Coord(brick.x * 8 + (i & 7), brick.y * 8 + (i >> 3 & 7), brick.z * 8 + (i >> 6));
-        const openvdb::Vec3s value = accessor.getValue(at);
-        for (int c = 0; c < 3; ++c) {
-          if (!std::isfinite(value[c])) {
-            return error(ErrorCode::BadFile, "the grid \"{}\" has the albedo {} at voxel {}", albedo_name_, value[c],
-                         coordinate_text(at));
-          }
-          const float in_range = std::clamp(value[c], 0.0f, 1.0f);
-          if (in_range != value[c]) ++clamped;
-          volume_.albedos[index][voxel][static_cast<size_t>(c)] =
-              static_cast<uint16_t>(std::lround(65535.0f * in_range));
-        }
-      }
-    }
-    if (clamped > 0) warn("the grid \"{}\" has {} albedos outside [0, 1]: clamped", albedo_name_, clamped);
-    return {};
-  }
-
-  /// Tiles share their densities' bricks, but not their albedos'.
-  void unshare_bricks() {
-    std::vector<bool> is_used(volume_.bricks.size(), false);
-    for (uint32_t& index : volume_.brick_table) {
-      if (index == kEmptyBrick) continue;
-      if (is_used[index]) {
-        volume_.bricks.push_back(DensityBrick(volume_.bricks[index]));
-        index = static_cast<uint32_t>(volume_.bricks.size() - 1);
-        continue;
-      }
-      is_used[index] = true;
-    }
-  }
-
   // ---- what is said
 
   template <typename... Args>
@@ -478,11 +417,11 @@ class VdbReader {
     volume_.warnings.push_back(fmt::format("{}: {}", path_, fmt::format(text, std::forward<Args>(args)...)));
   }
 
-  void warn_of_the_rest(const std::string& density) {
+  void warn_of_the_rest() {
     std::string emission, others;
     for (const auto& grid : contents_.grids) {
       const std::string name = grid->getName();
-      if (name == density || name == albedo_name_) continue;
+      if (used_.contains(name)) continue;
       std::string& list = is_emission(name) ? emission : others;
       list += fmt::format("{}\"{}\"", list.empty() ? "" : ", ", name);
     }
@@ -494,11 +433,12 @@ class VdbReader {
   const FogOptions& options_;
   const Job& job_;
   openvdb::io::File file_;
+  bool is_in_memory_ = false;  ///< of NanoVDB: file_ is not open, contents_ has voxels
   Contents contents_;
   SourceVolume volume_;
   Coord first_voxel_;
   std::map<double, uint32_t> tile_bricks_;  ///< by density
-  std::string albedo_name_;
+  std::set<std::string> used_;              ///< names of grids
 };
 
 /// What OpenVDB throws of a file is about its bytes.
@@ -519,13 +459,13 @@ Result<VolumeExtent> read_extent(const std::string& path, const FogOptions& opti
   return guarded<VolumeExtent>(path, [&] { return VdbReader(path, options, {}).read_extent(); });
 }
 
-Result<SourceVolume> read(const std::string& path, const FogOptions& options, const Job& job) {
-  return guarded<SourceVolume>(path, [&] { return VdbReader(path, options, job).read(); });
+Result<VolumeOnLattice> read(const std::string& path, const FogOptions& options, const Job& job) {
+  return guarded<VolumeOnLattice>(path, [&] { return VdbReader(path, options, job).read(); });
 }
 
 }  // namespace
 }  // namespace farfield
 
-extern "C" FARFIELD_API const farfield::VolumeModule farfield_volume_module_2;
-const farfield::VolumeModule farfield_volume_module_2 = {farfield::read_extent, farfield::read,
+extern "C" FARFIELD_API const farfield::VolumeModule farfield_volume_module_4;
+const farfield::VolumeModule farfield_volume_module_4 = {farfield::read_extent, farfield::read,
                                                          farfield::write_openvdb};

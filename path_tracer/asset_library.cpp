@@ -56,6 +56,7 @@ void add_fog_flags(const FogOptions& fog, std::vector<std::string>& command) {
   if (fog.density_scale != 1) add("--density-scale", fmt::format("{}", fog.density_scale));
   if (fog.albedo) add("--albedo", fmt::format("{},{},{}", fog.albedo->x, fog.albedo->y, fog.albedo->z));
   if (fog.anisotropy != 0) add("--anisotropy", fmt::format("{}", fog.anisotropy));
+  if (fog.fibre_roughness != kFibreRoughness) add("--fibre-roughness", fmt::format("{}", fog.fibre_roughness));
   if (fog.level_set) command.push_back("--level-set");
 }
 

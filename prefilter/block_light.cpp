@@ -8,7 +8,7 @@
 
 #include "base/hash.h"
 #include "base/random.h"
-#include "scattering/fog_phase.h"
+#include "scattering/albedo.h"
 
 namespace farfield {
 namespace {
@@ -37,6 +37,7 @@ class BlockMedium {
 
   int side() const { return block_.side(); }
   vec3 albedo(const ivec3& voxel) const { return block_.albedo(voxel); }
+  FogParams phase(const ivec3& voxel, float anisotropy) const { return block_.phase(voxel, anisotropy); }
 
   Stop stop(const Line& line, double depth) const {
     ivec3 cell;
@@ -50,7 +51,7 @@ class BlockMedium {
     double passed = 0;
     for (double t = 0;;) {
       const int axis = next.x <= next.y && next.x <= next.z ? 0 : next.y <= next.z ? 1 : 2;
-      const double end = std::max(next[axis], t), here = block_.depth(cell), step = here * (end - t);
+      const double end = std::max(next[axis], t), here = block_.depth(cell, line.direction), step = here * (end - t);
       if (here > 0 && passed + step >= depth) {
         const double at = std::min(t + (depth - passed) / here, end);
         return {line.origin + at * line.direction, cell, depth};
@@ -74,6 +75,13 @@ class CubeMedium {
 
   int side() const { return cube_.side; }
   vec3 albedo(const ivec3&) const { return cube_.albedo; }
+  FogParams phase(const ivec3&, float anisotropy) const {
+    FogParams phase;
+    phase.anisotropy = anisotropy;
+    phase.has_shape = cube_.has_shape;
+    phase.sggx = cube_.shape;
+    return phase;
+  }
 
   Stop stop(const Line& line, double depth) const {
     double length = kInfinity;
@@ -81,7 +89,8 @@ class CubeMedium {
       const double d = line.direction[axis];
       if (d != 0) length = std::min(length, ((d > 0 ? side() : 0) - line.origin[axis]) / d);
     }
-    const double rate = cube_.depth / side(), all = rate * std::max(length, 0.0);
+    const double across = cube_.has_shape ? shape_sigma(cube_.shape, line.direction) : 1.0;
+    const double rate = cube_.depth * across / side(), all = rate * std::max(length, 0.0);
     if (!(all >= depth)) return {{}, ivec3(-1), all};
     return {line.origin + depth / rate * line.direction, ivec3(0), depth};
   }
@@ -113,8 +122,6 @@ dvec3 scattered(const dvec3& direction, const FogParams& phase, Rng& rng) {
 template <typename Medium>
 BlockLight follow(const Medium& medium, const BlockRays& rays) {
   const uint32_t count = (rays.count + 5) / 6 * 6;
-  FogParams phase;
-  phase.anisotropy = rays.anisotropy;
   Rng of_block(rays.seed);
   const float u = of_block.next(), v = of_block.next();
   BlockLight light;
@@ -134,8 +141,8 @@ BlockLight follow(const Medium& medium, const BlockRays& rays) {
     uint32_t events = 0;
     while (stop.is_hit() && events < kMostEvents) {
       throughput *= dvec3(medium.albedo(stop.voxel));
-      line = {stop.point, scattered(line.direction, phase, rng)};
-      if (events == 0) {
+      line = {stop.point, scattered(line.direction, medium.phase(stop.voxel, rays.anisotropy), rng)};
+      if (events == 0 && rays.with_single) {
         const double through = weight * std::exp(-medium.stop(line, kInfinity).depth);
         light.single += through * throughput;
         light.single_if_white += through;
@@ -145,8 +152,12 @@ BlockLight follow(const Medium& medium, const BlockRays& rays) {
     }
     left += weight * throughput;
     cosines += weight * throughput.y * glm::dot(came, line.direction);
-    if (light.events.size() < events) light.events.resize(events, 0.0);
+    if (light.events.size() < events) {
+      light.events.resize(events, 0.0);
+      light.event_cosines.resize(events, 0.0);
+    }
     light.events[events - 1] += weight;
+    light.event_cosines[events - 1] += weight * glm::dot(came, line.direction);
   }
   light.single /= count;
   light.single_if_white /= count;
@@ -154,6 +165,7 @@ BlockLight follow(const Medium& medium, const BlockRays& rays) {
   light.albedo = left / stopped;
   light.cosine = left.y > 0 ? cosines / left.y : 0;
   for (double& share : light.events) share /= stopped;
+  for (double& cosine : light.event_cosines) cosine /= stopped;
   return light;
 }
 
@@ -172,20 +184,45 @@ FogBlock::FogBlock(const SourceVolume& source, const ivec3& lower, int side)
       }
 }
 
-double FogBlock::depth(const ivec3& voxel) const {
+double FogBlock::depth(const ivec3& voxel, const dvec3& w) const {
   const ivec3 at = lower_ + voxel, brick = at / kVolumeBrickSide;
   const uint32_t index = source_.brick_at(brick);
-  return index == kEmptyBrick ? 0.0 : static_cast<double>(source_.bricks[index][index_in_brick(at)]) * voxel_size_;
+  if (index == kEmptyBrick) return 0;
+  const size_t i = index_in_brick(at);
+  return static_cast<double>(source_.bricks[index][i]) * source_sigma(source_, index, i, w) * voxel_size_;
 }
 
 vec3 FogBlock::albedo(const ivec3& voxel) const {
-  if (source_.albedos.empty()) return source_.albedo;
+  if (!has_own_albedos(source_)) return source_.albedo;
   const ivec3 at = lower_ + voxel;
-  return albedo_of(source_.brick_table[source_.table_index(at / kVolumeBrickSide)], index_in_brick(at));
+  return albedo_of(brick_of(at), index_in_brick(at));
 }
 
 vec3 FogBlock::albedo_of(uint32_t brick, size_t in_brick) const {
-  return source_.albedos.empty() ? source_.albedo : unpack_albedo(source_.albedos[brick][in_brick]);
+  const vec3 albedo = source_.albedos.empty() ? source_.albedo : unpack_albedo(source_.albedos[brick][in_brick]);
+  return source_.self_shadowing.empty() ? albedo : cluster_albedo(albedo, source_.self_shadowing[brick][in_brick]);
+}
+
+FogParams FogBlock::phase(const ivec3& voxel, float anisotropy) const {
+  FogParams phase;
+  phase.anisotropy = anisotropy;
+  if (source_.anisotropies.empty() && source_.shapes.empty()) return phase;
+  const ivec3 at = lower_ + voxel;
+  const uint32_t brick = brick_of(at);
+  if (!source_.anisotropies.empty()) phase.anisotropy = source_.anisotropies[brick][index_in_brick(at)];
+  phase.has_shape = !source_.shapes.empty();
+  if (phase.has_shape) phase.sggx = source_shape(source_, brick, index_in_brick(at));
+  return phase;
+}
+
+double BlockLight::cosine_for(double cube_albedo) const {
+  double throughput = 1, left = 0, cosine_sum = 0;
+  for (size_t n = 0; n < events.size(); ++n) {
+    throughput *= cube_albedo;
+    left += throughput * events[n];
+    cosine_sum += throughput * event_cosines[n];
+  }
+  return left > 0 ? cosine_sum / left : 0.0;
 }
 
 BlockLight follow_light(const FogBlock& block, const BlockRays& rays) { return follow(BlockMedium(block), rays); }

@@ -36,8 +36,19 @@ const char* name_of(Downsampling method);
 /// Errors: InvalidArgument, with the names that there are.
 Result<Downsampling> parse_downsampling(const std::string& name);
 
+// Of a source whose voxels have ellipsoids of attenuation (SGGX), coarser voxels have the mean ellipsoid, and densities
+// that let through what they should through it; Aniso stretches it by the axes. Of flakes, reflectances are means, and
+// light is not followed.
+
 /// Goes up when downsample() comes to give other results.
-inline constexpr uint32_t kFogVersion = 1;
+inline constexpr uint32_t kFogVersion = 2;
+
+/// What a voxel of flakes has besides what fog has: means over its block.
+struct FlakeLook {
+  vec3 diffuse{0.0f}, specular{0.0f}, transmission{0.0f}, emission{0.0f};  ///< as SourceFlakes has them
+  float roughness = 0;
+  PackedOctants octants = kFullOctants;  ///< of level 0
+};
 
 /// A voxel of a level, in full precision.
 struct FogVoxel {
@@ -46,6 +57,7 @@ struct FogVoxel {
   float self_shadowing = 1;             ///< A in (0, 1]
   float anisotropy = 0;                 ///< mean cosine of all that the voxel scatters; of Matched
   SymMat3 shape = SymMat3::identity();  ///< of the attenuation; lambda_max = 1
+  FlakeLook flakes;                     ///< of flakes alone
 };
 
 /// Makes the voxels of one level, k >= 1, from a source that outlives it. Immutable; any thread.
@@ -59,8 +71,13 @@ class FogDownsampler {
   FogVoxel voxel(const ivec3& coordinate) const;
   /// Of Matched: the same for a density that is known.
   FogVoxel voxel(const ivec3& coordinate, float density) const;
-  /// The density alone, of Transp: the mean along the three axes of what lets through what the block does.
-  float density(const ivec3& coordinate) const;
+  /// Density and shape alone, of Transp: the mean along the three axes of what lets through what the block does, and
+  /// the block's mean shape.
+  struct Attenuation {
+    float density = 0;
+    SymMat3 shape = SymMat3::identity();
+  };
+  Attenuation attenuation(const ivec3& coordinate) const;
 
  private:
   BlockRays block_rays(const ivec3& coordinate) const;

@@ -4,13 +4,14 @@
 #include "prefilter/match_fog.h"
 
 #include <algorithm>
-#include <atomic>
+#include <array>
 #include <cmath>
 #include <vector>
 
 #include "base/hash.h"
 #include "base/parallel.h"
 #include "prefilter/fixed_sum.h"
+#include "prefilter/fog_shape.h"
 #include "prefilter/isotropic_lines.h"
 #include "prefilter/match_lines.h"
 #include "prefilter/voxel_ratios.h"  // SourceAndMedium
@@ -18,12 +19,13 @@
 namespace farfield {
 namespace {
 
-constexpr int kPasses = 8;
+constexpr int kPasses = 5;
 constexpr double kLinesPerVoxel = 24;  ///< through each, in each pass
 /// How much a block's own density counts against what lines say of it, in units of the sums: inside of thick fog, where
 /// no line gets, it is all there is.
 constexpr double kPrior = 0.03;
-constexpr int kWholePasses = 3;
+constexpr int kWholePasses = 2;
+constexpr size_t kLineSets = 2;     ///< that take turns: the source, which is what takes time, is walked once for each
 constexpr double kMostWhole = 0.3;  ///< a step of all densities together changes none by a larger share
 constexpr double kFewestLines = 20000, kMostLines = 4e6;
 constexpr uint64_t kSeed = 0x666f67;  // "fog"
@@ -71,7 +73,9 @@ class FogMatcher {
   double source_depth(const VoxelRay& ray) const {
     double depth = 0;
     walk_grid(source_, 1, ray, [&](uint32_t brick, size_t voxel, double length) {
-      depth += static_cast<double>(source_.bricks[brick][voxel]) * length;
+      const float density = source_.bricks[brick][voxel];
+      if (density > 0)
+        depth += static_cast<double>(density) * length * source_sigma(source_, brick, voxel, ray.direction);
     });
     return depth * source_.voxel_size;
   }
@@ -81,17 +85,32 @@ class FogMatcher {
   void visit_depths(const VoxelRay& ray, const Visit& visit) const {
     walk_grid(level_, side_, ray, [&](uint32_t brick, size_t voxel, double length) {
       const float density = level_.bricks[brick][voxel];
-      if (density > 0)
-        visit(brick * kVolumeBrickVoxels + voxel, static_cast<double>(density) * length * source_.voxel_size);
+      if (!(density > 0)) return;
+      const double depth = static_cast<double>(density) * length * source_.voxel_size;
+      visit(brick * kVolumeBrickVoxels + voxel, depth * source_sigma(level_, brick, voxel, ray.direction));
     });
   }
 
-  /// Calls see(ray) for the next lines, from many threads. Errors: Cancelled.
+  /// A line and its optical depth in the source, once known.
+  struct Line {
+    VoxelRay ray;
+    float& source_depth;
+  };
+  double depth_in_source(const Line& line) const {
+    if (line.source_depth < 0) line.source_depth = static_cast<float>(source_depth(line.ray));
+    return static_cast<double>(line.source_depth);
+  }
+
+  /// Calls see(line) for the next set of lines, from many threads. Errors: Cancelled.
   template <typename See>
   Result<void> for_next_lines(const See& see) {
-    const uint64_t seed = mix64(kSeed, passes_++);
+    const size_t set = passes_++ % kLineSets;
+    const uint64_t seed = mix64(kSeed, set);
+    std::vector<float>& depths = source_depths_[set];
+    depths.resize(lines_, -1.0f);
     parallel_for(lines_, 1024, [&](size_t begin, size_t end) {
-      for (size_t i = begin; i < end && !job_.is_cancelled(); ++i) see(isotropic_line(box_, even_coordinates(i, seed)));
+      for (size_t i = begin; i < end && !job_.is_cancelled(); ++i)
+        see(Line{isotropic_line(box_, even_coordinates(i, seed)), depths[i]});
     });
     if (job_.is_cancelled()) return make_error(ErrorCode::Cancelled, "bake: cancelled");
     job_.report(static_cast<double>(passes_) / (kPasses + kWholePasses), "match");
@@ -104,17 +123,17 @@ class FogMatcher {
       double depth;
     };
     std::vector<SourceAndMedium> sums(level_.bricks.size() * kVolumeBrickVoxels);
-    FARFIELD_TRY(for_next_lines([&](const VoxelRay& ray) {
+    FARFIELD_TRY(for_next_lines([&](const Line& line) {
       thread_local std::vector<Part> parts;
       parts.clear();
       double depth = 0;
-      visit_depths(ray, [&](size_t number, double of_part) {
+      visit_depths(line.ray, [&](size_t number, double of_part) {
         parts.push_back({number, of_part});
         depth += of_part;
       });
       if (parts.empty()) return;
       const double passing = std::exp(-depth), stopped = -std::expm1(-depth);
-      const double stopped_by_source = -std::expm1(-source_depth(ray));
+      const double stopped_by_source = -std::expm1(-depth_in_source(line));
       for (const Part& part : parts) {
         sums[part.number].source.add(part.depth * passing * stopped_by_source);
         sums[part.number].medium.add(part.depth * passing * stopped);
@@ -136,13 +155,13 @@ class FogMatcher {
   /// the source: least squares alone leave a bias.
   Result<void> match_whole() {
     FixedSum missing, slope;
-    FARFIELD_TRY(for_next_lines([&](const VoxelRay& ray) {
+    FARFIELD_TRY(for_next_lines([&](const Line& line) {
       double depth = 0, known = 0;
-      visit_depths(ray, [&](size_t number, double of_part) {
+      visit_depths(line.ray, [&](size_t number, double of_part) {
         depth += of_part;
         known += of_part * static_cast<double>(known_[number]);
       });
-      missing.add(std::exp(-depth) - std::exp(-source_depth(ray)));
+      missing.add(std::exp(-depth) - std::exp(-depth_in_source(line)));
       slope.add(known * std::exp(-depth));
     }));
     if (!(slope.value() > 0)) return {};
@@ -161,6 +180,7 @@ class FogMatcher {
   const VoxelBox box_;  ///< of the level, in voxels of the source
   uint64_t lines_ = 0;  ///< of each pass
   uint64_t passes_ = 0;
+  std::array<std::vector<float>, kLineSets> source_depths_;  ///< by line; below 0: not known yet
   std::vector<float> known_;               ///< of each voxel: what lines say of it against what its block says
   const std::vector<DensityBrick> local_;  ///< densities of the blocks alone
 };

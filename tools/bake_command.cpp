@@ -161,7 +161,8 @@ void add_bake_command(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand(
       "bake", "Bake a model or a volume to a folder of levels; goes on where an interrupted bake stopped");
   command
-      ->add_option("source", arguments->source, "Model: OBJ, PLY, glTF or glb, gzipped or not. Volume: OpenVDB (.vdb)")
+      ->add_option("source", arguments->source,
+                   "Model: OBJ, PLY, glTF or glb, gzipped or not. Volume: OpenVDB or NanoVDB (.vdb, .nvdb)")
       ->required()
       ->check(is_named);
   command->add_option("-o,--output", arguments->output, "Folder to write, by convention NAME.farfield")

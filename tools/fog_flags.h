@@ -22,6 +22,10 @@ inline void add_fog_flags(CLI::App* command, FogOptions& fog) {
       ->add_option("--anisotropy", fog.anisotropy,
                    "OpenVDB: mean cosine of scattering, above 0 forwards (Henyey-Greenstein)")
       ->capture_default_str();
+  command
+      ->add_option("--fibre-roughness", fog.fibre_roughness,
+                   "OpenVDB: what fibres (a grid of directions) stop along themselves by what they stop across, 0 to 1")
+      ->capture_default_str();
   command->add_flag("--level-set", fog.level_set, "OpenVDB: take a level set for the fog inside it");
 }
 

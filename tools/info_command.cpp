@@ -72,7 +72,7 @@ void add_info_command(CLI::App& app, Action& action) {
       "Show what the levels of a baked asset hold, cost and miss, or what is understood of a model before a bake");
   command
       ->add_option("path", arguments->path,
-                   "Baked folder, or a model: OBJ, PLY, glTF or glb, gzipped or not; or a volume: .vdb")
+                   "Baked folder, or a model: OBJ, PLY, glTF or glb, gzipped or not; or a volume: .vdb, .nvdb")
       ->required()
       ->check(is_named);
   CLI::Option* mesh = command->add_option("--mesh", arguments->import.mesh, "glTF model: only this mesh, as for bake")

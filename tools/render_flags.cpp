@@ -32,7 +32,7 @@ Result<Blend> parse_blend(const std::string& text) {
 
 void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std::string& output_help) {
   RenderOptions& options = arguments.options;
-  command->add_option("scene", arguments.scene, "glTF scene: .glb or .gltf; or an OpenVDB volume: .vdb")
+  command->add_option("scene", arguments.scene, "glTF scene: .glb or .gltf; or a volume: .vdb, .nvdb")
       ->required()
       ->check(is_named);
   if (!output_help.empty())

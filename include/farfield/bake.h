@@ -187,14 +187,14 @@ struct BakeInput {
   std::string material_key;
 };
 
-/// Fog in the host's memory: a box of voxels, cubes in the asset's space. It becomes an asset of its own.
+/// Fog in the host's memory: a box of voxels. It becomes an asset of its own.
 struct BakeVolume {
   std::string name = "memory";  ///< what the asset says of its source
   uint32_t width = 0, height = 0, depth = 0;
   BakeRows<1> density;  ///< width * height * depth, x fastest, then y, then z: finite, >= 0; at least one above 0
   BakeRows<3> albedo;   ///< the same of linear RGB in [0, 1], single scattering. None: BakeFog::albedo
-  /// Voxel (i, j, k) is where this puts the cube [i, i + 1] x [j, j + 1] x [k, k + 1]: any rotation, mirrored or not,
-  /// one size along all axes.
+  /// Voxel (i, j, k) is where this puts the cube [i, i + 1] x [j, j + 1] x [k, k + 1]: any affine map. Where
+  /// that is no cube, the fog is resampled onto cubes of the shortest edge, and a warning says so.
   glm::dmat4x3 to_asset{1.0};
 };
 

@@ -209,7 +209,7 @@ def bake_volume(
     """Bakes fog into the folder `out`, as bake() does meshes.
 
     density: (depth, height, width), z, y, x: density[k, j, i] is that of the cube of voxel_size from voxel_size * (i, j,
-    k) on, which to_asset, a 4 x 4 or 3 x 4 matrix without shear or uneven scale, puts into the asset. density_scale: the
+    k) on, which to_asset, a 4 x 4 or 3 x 4 matrix, puts into the asset; with shear or uneven scale it is resampled onto cubes. density_scale: the
     attenuation coefficient, in 1 / unit of the asset, where the density is 1. albedo of single scattering: a number, three
     for linear RGB, or an array (depth, height, width, 3); without it 0.99. anisotropy: mean cosine of scattering, from
     -0.98 to 0.98. downsampling: how levels are made, "linear", "transp", "iso", "aniso" or "matched".

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/support/vdb_files.h"
 
+#define NANOVDB_USE_ZIP  // of its writer
+#include <nanovdb/util/IO.h>
+#include <nanovdb/util/OpenToNanoVDB.h>
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
@@ -37,6 +40,18 @@ openvdb::GridBase::Ptr make_grid(const VdbGrid& given) {
   }
 }
 
+openvdb::GridBase::Ptr placed_grid(const VdbGrid& given) {
+  const auto grid = make_grid(given);
+  grid->setName(given.name);
+  openvdb::math::Mat4d matrix;  // OpenVDB's vectors stand on the left
+  for (int column = 0; column < 4; ++column)
+    for (int row = 0; row < 4; ++row) matrix(column, row) = given.index_to_source[column][row];
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(matrix));
+  grid->setGridClass(given.kind == VdbGrid::Kind::LevelSet ? openvdb::GRID_LEVEL_SET : openvdb::GRID_FOG_VOLUME);
+  grid->setSaveFloatAsHalf(given.kind == VdbGrid::Kind::Half);
+  return grid;
+}
+
 template <typename Grid, typename Put>
 void take_voxels(const openvdb::GridBase::Ptr& base, const Put& put, std::vector<VdbVoxel>& voxels) {
   const auto grid = openvdb::gridPtrCast<Grid>(base);
@@ -63,18 +78,16 @@ std::vector<VdbVoxel> filled_cube(const ivec3& lower, int side, const std::funct
 void write_vdb(const std::filesystem::path& path, const std::vector<VdbGrid>& grids) {
   openvdb::initialize();
   openvdb::GridPtrVec written;
-  for (const VdbGrid& given : grids) {
-    const auto grid = make_grid(given);
-    grid->setName(given.name);
-    openvdb::math::Mat4d matrix;  // OpenVDB's vectors stand on the left
-    for (int column = 0; column < 4; ++column)
-      for (int row = 0; row < 4; ++row) matrix(column, row) = given.index_to_source[column][row];
-    grid->setTransform(openvdb::math::Transform::createLinearTransform(matrix));
-    grid->setGridClass(given.kind == VdbGrid::Kind::LevelSet ? openvdb::GRID_LEVEL_SET : openvdb::GRID_FOG_VOLUME);
-    grid->setSaveFloatAsHalf(given.kind == VdbGrid::Kind::Half);
-    written.push_back(grid);
-  }
+  for (const VdbGrid& given : grids) written.push_back(placed_grid(given));
   openvdb::io::File(path.string()).write(written);
+}
+
+void write_nvdb(const std::filesystem::path& path, const VdbGrid& given, bool fp8, bool zip) {
+  openvdb::initialize();
+  const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(placed_grid(given));
+  const auto handle = fp8 ? nanovdb::openToNanoVDB<nanovdb::HostBuffer, openvdb::FloatTree, nanovdb::Fp8>(*grid)
+                          : nanovdb::openToNanoVDB<nanovdb::HostBuffer, openvdb::FloatTree, float>(*grid);
+  nanovdb::io::writeGrid(path.string(), handle, zip ? nanovdb::io::Codec::ZIP : nanovdb::io::Codec::NONE);
 }
 
 void write_frustum_vdb(const std::filesystem::path& path) {

@@ -39,6 +39,8 @@ struct VdbGrid {
 std::vector<VdbVoxel> filled_cube(const ivec3& lower, int side, const std::function<double(const ivec3&)>& value);
 
 void write_vdb(const std::filesystem::path& path, const std::vector<VdbGrid>& grids);
+/// The same of one grid of floats as NanoVDB's own writer has it; `fp8`: quantised.
+void write_nvdb(const std::filesystem::path& path, const VdbGrid& grid, bool fp8, bool zip);
 /// One grid "density" in a frustum.
 void write_frustum_vdb(const std::filesystem::path& path);
 

@@ -98,6 +98,20 @@ TEST(GatherVolume, IsWhatTheFileThatHoldsItIsReadAs) {
   }
 }
 
+TEST(GatherVolume, ResamplesVoxelsThatAreNoCubes) {
+  const Ball ball;
+  BakeVolume tall = ball.volume();
+  const SourceVolume cubes = gather_volume(tall, {}).value();
+  tall.to_asset[1] *= 2.0;
+  const SourceVolume resampled = gather_volume(tall, {}).value();
+  ASSERT_EQ(resampled.warnings.size(), 1u);
+  EXPECT_NE(resampled.warnings[0].find("resampled onto cubes of"), std::string::npos);
+  EXPECT_EQ(resampled.dims, cubes.dims * ivec3(1, 2, 1));
+  EXPECT_EQ(resampled.active_voxels, 2 * cubes.active_voxels);
+  EXPECT_EQ(resampled.densest, cubes.densest);
+  EXPECT_NE(resampled.source_hash, cubes.source_hash);
+}
+
 TEST(GatherVolume, BakesToTheSameBytesAsTheFile) {
   const test::TemporaryFolder folder;
   const Ball ball;
@@ -188,7 +202,6 @@ TEST(GatherVolume, RefusesWhatIsNoVolumeAndSaysWhere) {
   expect_refusal([](Ball&, BakeVolume& v, BakeFog&) { v.depth = 0; }, "21 x 19 x 0 voxels");
   expect_refusal([](Ball&, BakeVolume& v, BakeFog&) { v.depth = 18; }, "6783 densities for 21 x 19 x 18 voxels");
   expect_refusal([](Ball& b, BakeVolume& v, BakeFog&) { v.albedo = {&b.albedo[0].x, 7}; }, "7 albedos");
-  expect_refusal([](Ball&, BakeVolume& v, BakeFog&) { v.to_asset[0] *= 2.0; }, "they must be cubes");
   expect_refusal([](Ball&, BakeVolume& v, BakeFog&) { v.to_asset[1] = dvec3(0.0); }, "singular");
   expect_refusal([](Ball&, BakeVolume& v, BakeFog&) { v.to_asset[3].z = NAN; }, "not finite");
   expect_refusal([](Ball&, BakeVolume&, BakeFog& f) { f.density_scale = 0; }, "density-scale");

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -66,6 +67,7 @@ struct BakedLevel {
   struct Value {
     float density = 0, step = 0;  ///< of the density's bytes
     vec3 albedo{0.0f};
+    uint32_t payload = 0;
   };
   Value at(const ivec3& voxel) const {
     const ivec3 brick = voxel >> ivec3(3);
@@ -78,7 +80,13 @@ struct BakedLevel {
     const uint8_t byte = b.density[static_cast<size_t>(i)];
     const float step = b.density_scale / 255;
     if (byte == 0) return {0, step, vec3(0.0f)};
-    return {step * static_cast<float>(byte), step, fog_params(view(), b.payload_index(i)).albedo};
+    return {step * static_cast<float>(byte), step, fog_params(view(), b.payload_index(i)).albedo, b.payload_index(i)};
+  }
+  /// sigma_t of a voxel along a direction of the source's space.
+  float attenuation(const Value& value, const dvec3& direction) const {
+    if (value.density == 0 || view().voxel_sggx.empty()) return value.density;
+    const vec3 w(glm::transpose(manifest.rotation) * direction);
+    return value.density * std::sqrt(std::max(0.0f, unpack(view().voxel_sggx[value.payload]).quadratic(w)));
   }
   template <typename Visit>
   void for_each_voxel(const Visit& visit) const {
@@ -145,6 +153,103 @@ TEST_F(ExportVolume, ABakeOfAnExportedLevelGivesItBack) {
   EXPECT_TRUE(std::ranges::equal(before.file->bytes(), after.file->bytes()));
 }
 
+/// Grids of level 3 of an asset with that level alone.
+std::map<std::string, VdbContent> grids_of(const fs::path& folder, const LevelData& level) {
+  test::write_asset(
+      folder / "a.farfield", {level},
+      [](const LevelView&) {
+        return LevelCost{1 << 20, 100};
+      },
+      dvec3(10, 0, 0));
+  const auto report = export_asset(folder / "a.farfield", folder / "a.vdb", {{3}});
+  EXPECT_TRUE(report) << report.error().message;
+  std::map<std::string, VdbContent> grids;
+  for (VdbContent& grid : test::read_vdb(folder / "a.vdb")) grids[grid.name] = grid;
+  return grids;
+}
+
+/// Directions that see all six numbers of an ellipsoid.
+const std::array<dvec3, 6> kDirections = {dvec3(1, 0, 0),
+                                          dvec3(0, 1, 0),
+                                          dvec3(0, 0, 1),
+                                          glm::normalize(dvec3(1, 1, 0)),
+                                          glm::normalize(dvec3(1, 0, -1)),
+                                          glm::normalize(dvec3(0, 1, 1))};
+
+// A step of sigma is 1 / 255 of the largest, one of a correlation 1 / 127: together 1.5 % of the largest.
+TEST_F(ExportVolume, ABakeGivesBackPhaseFunctionsAndEllipsoidsOfFog) {
+  test::write_vdb(path("cloud.vdb"), cloud_grids());
+  struct Case {
+    Downsampling method;
+    double anisotropy;
+  };
+  for (const Case& c : {Case{Downsampling::Aniso, 0}, Case{Downsampling::Iso, 0.6}, Case{Downsampling::Matched, 0}}) {
+    BakeOptions options;
+    options.downsampling = c.method;
+    options.import.fog.anisotropy = c.anisotropy;
+    ASSERT_TRUE(bake(path("cloud.vdb"), path("cloud.farfield"), options));
+    export_to(path("2.vdb"), {2}, path("cloud.farfield"));
+    BakeOptions again;
+    again.source_only = true;
+    const auto baked = bake(path("2.vdb"), path("again.farfield"), again);
+    ASSERT_TRUE(baked) << baked.error().message;
+    EXPECT_TRUE(baked->warnings.empty()) << baked->warnings.front();
+    const BakedLevel before(path("cloud.farfield"), 2), after(path("again.farfield"), 0);
+    EXPECT_EQ(after.view().header.fog_anisotropy, before.view().header.fog_anisotropy);
+    EXPECT_EQ(after.view().voxel_sggx.empty(), before.view().voxel_sggx.empty());
+    EXPECT_EQ(after.view().voxel_anisotropy.empty(), before.view().voxel_anisotropy.empty());
+    int compared = 0;
+    before.for_each_voxel([&](const ivec3& voxel) {
+      const auto ours = before.at(voxel), theirs = after.at(after.voxel_at(before.place_of(voxel)));
+      if (theirs.density == 0) return;
+      for (const dvec3& w : kDirections)
+        EXPECT_NEAR(after.attenuation(theirs, w), before.attenuation(ours, w),
+                    1.1f * theirs.step + 0.015f * ours.density);
+      const FogParams a = fog_params(before.view(), ours.payload), b = fog_params(after.view(), theirs.payload);
+      EXPECT_NEAR(b.anisotropy, a.anisotropy, 1.01f / 127);
+      EXPECT_NEAR(b.self_shadowing, a.self_shadowing, 1.01f / 255);
+      EXPECT_LT(max_component(glm::abs(b.albedo - a.albedo)), 0.005f);
+      ++compared;
+    });
+    EXPECT_GT(compared, 100);
+  }
+}
+
+// What volumes of meshes are.
+TEST_F(ExportVolume, ABakeGivesFlakesBack) {
+  LevelData level = test::full_level_of_version_5();
+  for (size_t i = 0; i < level.voxel_sggx.size(); ++i) {  // as bakes make them
+    const float f = static_cast<float>(i);
+    level.voxel_emission[i] = pack_radiance(vec3(0.5f, 2, f));
+    level.voxel_sggx[i] = pack_flake_sggx({1, 0.3f + 0.1f * f, 0.5f, 0.2f, -0.1f * f, 0.1f});
+  }
+  grids_of(folder_.path(), level);
+  const auto baked = bake(path("a.vdb"), path("again.farfield"), {});
+  ASSERT_TRUE(baked) << baked.error().message;
+  EXPECT_TRUE(baked->warnings.empty()) << baked->warnings.front();
+  const BakedLevel before(path("a.farfield"), 3), after(path("again.farfield"), 0);
+  const LevelHeader &was = before.view().header, &is = after.view().header;
+  EXPECT_EQ(is.medium, Medium::Flakes);
+  EXPECT_EQ(is.hot_spot, was.hot_spot);
+  EXPECT_EQ(is.highlight_lean, was.highlight_lean);
+  EXPECT_EQ(is.open_side, was.open_side);
+  EXPECT_EQ(voxel_count(after.view()), voxel_count(before.view()));
+  before.for_each_voxel([&](const ivec3& voxel) {
+    const auto ours = before.at(voxel), theirs = after.at(after.voxel_at(before.place_of(voxel)));
+    for (const dvec3& w : kDirections)
+      EXPECT_NEAR(after.attenuation(theirs, w), before.attenuation(ours, w),
+                  1.1f * theirs.step + 0.015f * ours.density);
+    const FlakeParams a = flake_params(before.view(), ours.payload), b = flake_params(after.view(), theirs.payload);
+    EXPECT_EQ(b.diffuse, a.diffuse);
+    EXPECT_EQ(b.specular, a.specular);
+    EXPECT_EQ(b.transmission, a.transmission);
+    EXPECT_NEAR(b.roughness2, a.roughness2, 1e-6);
+    EXPECT_EQ(b.self_shadowing, a.self_shadowing);
+    EXPECT_EQ(after.view().voxel_octants[theirs.payload], before.view().voxel_octants[ours.payload]);
+    EXPECT_EQ(after.view().voxel_emission[theirs.payload], before.view().voxel_emission[ours.payload]);
+  });
+}
+
 TEST_F(ExportVolume, SeveralLevelsAreGridsAsOpenVdbNamesThem) {
   const fs::path asset = bake_cloud();
   const ExportReport report = export_to(path("all.vdb"), {}, asset);
@@ -181,21 +286,6 @@ TEST_F(ExportVolume, SeveralLevelsAreGridsAsOpenVdbNamesThem) {
   const auto alone = bake(path("1.vdb"), path("alone.farfield"), options);
   ASSERT_TRUE(alone) << alone.error().message;
   EXPECT_EQ(baked->manifest.levels[0].file_hash, alone->manifest.levels[0].file_hash);
-}
-
-/// Grids of level 3 of an asset with that level alone.
-std::map<std::string, VdbContent> grids_of(const fs::path& folder, const LevelData& level) {
-  test::write_asset(
-      folder / "a.farfield", {level},
-      [](const LevelView&) {
-        return LevelCost{1 << 20, 100};
-      },
-      dvec3(10, 0, 0));
-  const auto report = export_asset(folder / "a.farfield", folder / "a.vdb", {{3}});
-  EXPECT_TRUE(report) << report.error().message;
-  std::map<std::string, VdbContent> grids;
-  for (VdbContent& grid : test::read_vdb(folder / "a.vdb")) grids[grid.name] = grid;
-  return grids;
 }
 
 const test::VdbVoxel& voxel_at(const VdbContent& grid, const ivec3& at) {

@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 
+#include "base/random.h"
 #include "tests/support/files.h"
 #include "tests/support/vdb_files.h"
+#include "tests/support/volumes.h"
 
 namespace farfield {
 namespace {
@@ -120,13 +123,30 @@ TEST_F(ReadVolume, TransformsThatTurnMirrorAndMoveAreKept) {
   EXPECT_EQ(read(write({plain})).rotation, glm::dmat3(1.0));
 }
 
-TEST_F(ReadVolume, VoxelsThatAreNoCubesAreRefused) {
-  VdbGrid grid = one_voxel();
+TEST_F(ReadVolume, VoxelsThatAreNoCubesAreResampled) {
+  VdbGrid grid = one_voxel({3, 0, 5}, 0.75);
   grid.index_to_source[2][2] = 2;
-  EXPECT_NE(failure(write({grid}), ErrorCode::Unsupported).find("1 x 1 x 2: only cubes are read"), std::string::npos);
+  const SourceVolume tall = read(write({grid}));
+  EXPECT_TRUE(has_warning(tall, "cloud.vdb: voxels are 1 x 1 x 2: resampled onto cubes of 1"));
+  EXPECT_EQ(tall.dims, ivec3(1, 1, 2));
+  EXPECT_EQ(tall.active_voxels, 2u);
+  EXPECT_EQ(density_at(tall, {0, 0, 0}), 0.75f);
+  EXPECT_EQ(density_at(tall, {0, 0, 1}), 0.75f);
+  expect_near(tall.origin, {2.5, -0.5, 9}, 1e-12);
+  EXPECT_NE(tall.source_hash, 0u);
   grid.index_to_source = glm::dmat4(1.0);
   grid.index_to_source[1][0] = 0.3;
-  EXPECT_NE(failure(write({grid}), ErrorCode::Unsupported).find("sheared"), std::string::npos);
+  EXPECT_TRUE(has_warning(read(write({grid})), "1 x 1.04403 x 1, sheared: resampled onto cubes of 1"));
+  grid.index_to_source = glm::dmat4(1.0);
+  grid.index_to_source[2][2] = 1e11;
+  EXPECT_NE(failure(write({grid}), ErrorCode::Unsupported).find("cloud.vdb: as cubes of 1 it has more than"),
+            std::string::npos);
+  grid.voxels.push_back({{4000000, 4000000, 5}, 1});
+  grid.index_to_source[2][2] = 2000;
+  EXPECT_NE(failure(write({grid}), ErrorCode::Unsupported).find("extends over"), std::string::npos);
+}
+
+TEST_F(ReadVolume, FrustaAreRefused) {
   const fs::path frustum = folder_.path() / "frustum.vdb";
   test::write_frustum_vdb(frustum);
   EXPECT_NE(failure(frustum, ErrorCode::Unsupported).find("frustum"), std::string::npos);
@@ -186,6 +206,143 @@ TEST_F(ReadVolume, ValuesThatAreNoDensitiesAreErrorsWithTheirPlace) {
 TEST_F(ReadVolume, ExtremeDensitiesAreRead) {
   EXPECT_EQ(read(write({one_voxel({0, 0, 0}, 1e8)})).densest, 1e8f);
   EXPECT_EQ(read(write({one_voxel({0, 0, 0}, 1e-20)})).densest, 1e-20f);
+}
+
+/// Noise, a tile, a turn: all that trees of both kinds have.
+VdbGrid varied_grid() {
+  VdbGrid grid;
+  grid.voxels = test::filled_cube({-30, 120, 4090}, 20, [](const ivec3& v) { return 0.1 + test::smooth_noise(v); });
+  grid.tiles = {{{128, 0, 0}, {255, 127, 127}, 0.25}, {{64, 8, 8}, {71, 15, 15}, 0.5}};
+  grid.index_to_source = glm::dmat4(0.5 * glm::dmat3(dvec3(0, 1, 0), dvec3(-1, 0, 0), dvec3(0, 0, 1)));
+  grid.index_to_source[3] = glm::dvec4(1, 2, 3, 1);
+  return grid;
+}
+
+TEST_F(ReadVolume, NanoVdbIsWhatOpenVdbIs) {
+  const VdbGrid grid = varied_grid();
+  const SourceVolume open = read(write({grid}));
+  const fs::path path = folder_.path() / "cloud.nvdb";
+  for (const bool fp8 : {false, true})
+    for (const bool zip : {false, true}) {
+      test::write_nvdb(path, grid, fp8, zip);
+      ASSERT_TRUE(is_volume_file(path));
+      const SourceVolume nano = read(path);
+      EXPECT_EQ(nano.dims, open.dims);
+      EXPECT_EQ(nano.rotation, open.rotation);
+      EXPECT_EQ(nano.origin, open.origin);
+      EXPECT_EQ(nano.voxel_size, open.voxel_size);
+      EXPECT_EQ(nano.active_voxels, open.active_voxels);
+      ASSERT_EQ(nano.brick_table.size(), open.brick_table.size());
+      for (size_t entry = 0; entry < open.brick_table.size(); ++entry) {
+        ASSERT_EQ(nano.brick_table[entry] == kEmptyBrick, open.brick_table[entry] == kEmptyBrick);
+        if (open.brick_table[entry] == kEmptyBrick) continue;
+        const DensityBrick &a = nano.bricks[nano.brick_table[entry]], &b = open.bricks[open.brick_table[entry]];
+        for (size_t i = 0; i < a.size(); ++i) ASSERT_NEAR(a[i], b[i], fp8 ? 0.005 : 0);
+      }
+      const auto extent = read_volume_extent(path);
+      ASSERT_TRUE(extent);
+      EXPECT_EQ(extent->lower, read_volume_extent(folder_.path() / "cloud.vdb")->lower);
+    }
+  EXPECT_NE(failure(path, ErrorCode::Unsupported, {.density_grid = "smoke"}).find("there is no grid \"smoke\""),
+            std::string::npos);
+}
+
+// Every cut and every byte: an error or a volume, in bounded memory.
+TEST_F(ReadVolume, DamagedNanoVdbIsRefusedOrRead) {
+  const fs::path whole = folder_.path() / "cloud.nvdb", damaged = folder_.path() / "damaged.nvdb";
+  VdbGrid grid;
+  grid.voxels = test::filled_cube({0, 0, 0}, 9, [](const ivec3&) { return 1; });
+  test::write_nvdb(whole, grid, false, false);
+  const auto bytes = test::read_bytes(whole);
+  for (const size_t cut : {size_t{9}, size_t{17}, size_t{200}, size_t{900}, bytes.size() / 2, bytes.size() - 1}) {
+    test::write_bytes(damaged, std::span(bytes).first(cut));
+    const auto volume = read_volume(damaged);
+    ASSERT_FALSE(volume) << cut;
+    EXPECT_EQ(volume.error().code, ErrorCode::BadFile) << volume.error().message;
+  }
+  int refused = 0;
+  Rng rng(11);
+  for (int i = 0; i < 400; ++i) {
+    auto broken = bytes;
+    // Headers, tree, root and the first words of each node have the offsets; half of the damage goes there.
+    const size_t range = i % 2 == 0 ? 1200 : broken.size();
+    const auto at = static_cast<size_t>(rng.next() * static_cast<float>(range - 1));
+    for (size_t k = at; k < std::min(at + 8, broken.size()); ++k)
+      broken[k] ^= static_cast<std::byte>(1 + static_cast<int>(rng.next() * 254));
+    test::write_bytes(damaged, broken);
+    if (!read_volume(damaged)) ++refused;
+  }
+  EXPECT_GT(refused, 20);
+  // Two parents of one node, which would make much out of little.
+  constexpr size_t kHeaders = 16 + 176 + 8;  // and the name, "density"
+  uint64_t counts = 0;
+  std::memcpy(&counts, &bytes[kHeaders + 672 + 32], 4);
+  EXPECT_EQ(counts, 8u);  // leaves
+  auto twice = bytes;
+  const std::vector<std::byte> first(twice.begin(), twice.begin() + 8);
+  uint64_t lower_offset = 0;
+  std::memcpy(&lower_offset, &bytes[kHeaders + 672 + 8], 8);
+  const size_t table = kHeaders + 672 + lower_offset + 1088;  // of a lower node: boxes, masks and statistics are before
+  int64_t child = 0;
+  std::memcpy(&child, &twice[table], 8);
+  std::memcpy(&twice[table + 8], &child, 8);
+  test::write_bytes(damaged, twice);
+  EXPECT_NE(failure(damaged, ErrorCode::BadFile).find("second parent"), std::string::npos);
+}
+
+double attenuation_at(const SourceVolume& volume, const ivec3& voxel, const dvec3& in_source) {
+  const uint32_t brick = volume.brick_at(voxel / 8);
+  const auto& s = volume.shapes[brick][index_in_brick(voxel)];
+  const dvec3 w = glm::transpose(volume.rotation) * in_source;
+  const double square = double{s[0]} * w.x * w.x + double{s[1]} * w.y * w.y + double{s[2]} * w.z * w.z +
+                        2 * (double{s[3]} * w.x * w.y + double{s[4]} * w.x * w.z + double{s[5]} * w.y * w.z);
+  return double{density_at(volume, voxel)} * std::sqrt(std::max(square, 0.0));
+}
+
+VdbGrid vector_grid(const char* name, const VdbGrid& like, const vec3& value) {
+  VdbGrid grid = like;
+  grid.name = name, grid.kind = VdbGrid::Kind::Color;
+  for (test::VdbVoxel& voxel : grid.voxels) voxel.color = value;
+  return grid;
+}
+
+TEST_F(ReadVolume, FibresStopAcrossThemselves) {
+  VdbGrid density = one_voxel({0, 0, 0}, 2);
+  density.voxels.push_back({{1, 0, 0}, 1});
+  const double c = std::cos(0.3), s = std::sin(0.3);
+  density.index_to_source = glm::dmat4(glm::dmat3(dvec3(c, s, 0), dvec3(-s, c, 0), dvec3(0, 0, 1)));
+  VdbGrid fibre = vector_grid("direction", density, vec3(0, 3, 0));  // in the source's space, of any length
+  fibre.voxels[1].color = vec3(0.0f);
+  const SourceVolume volume = read(write({density, fibre}), {.fibre_roughness = 0.25});
+  EXPECT_NEAR(attenuation_at(volume, {0, 0, 0}, {0, 1, 0}), 0.5, 1e-6);
+  EXPECT_NEAR(attenuation_at(volume, {0, 0, 0}, {1, 0, 0}), 2, 1e-6);
+  EXPECT_NEAR(attenuation_at(volume, {0, 0, 0}, {0, 0, 1}), 2, 1e-6);
+  EXPECT_NEAR(attenuation_at(volume, {1, 0, 0}, {0, 0.6, 0.8}), 1, 1e-6);
+  EXPECT_TRUE(has_warning(volume, "1 voxels have no direction"));
+  EXPECT_NE(failure(folder_.path() / "cloud.vdb", ErrorCode::InvalidArgument, {.fibre_roughness = 1.5})
+                .find("--fibre-roughness"),
+            std::string::npos);
+}
+
+TEST_F(ReadVolume, EllipsoidsAreWhatSggxGridsSay) {
+  const VdbGrid density = one_voxel({0, 0, 0}, 2);
+  const VdbGrid diagonal = vector_grid("sggx_diagonal", density, vec3(1, 0.25f, 4)),
+                rest = vector_grid("sggx_off_diagonal", density, vec3(0.25f, 0, -0.5f));
+  const SourceVolume volume = read(write({density, diagonal, rest}));
+  EXPECT_NEAR(attenuation_at(volume, {0, 0, 0}, {0, 1, 0}), 1, 1e-6);
+  EXPECT_NEAR(attenuation_at(volume, {0, 0, 0}, {0, 0, 1}), 4, 1e-6);
+  EXPECT_NEAR(attenuation_at(volume, {0, 0, 0}, {0, 0.6, -0.8}), 2 * std::sqrt(0.09 + 2.56 + 0.48), 1e-6);
+  EXPECT_FALSE(has_warning(volume, "sggx"));
+  EXPECT_NE(failure(write({density, diagonal}), ErrorCode::Unsupported).find("belong together"), std::string::npos);
+  EXPECT_NE(
+      failure(write({density, diagonal, vector_grid("sggx_off_diagonal", density, vec3(NAN))}), ErrorCode::BadFile)
+          .find("\"sggx_off_diagonal\" has the value (nan, nan, nan) at voxel (0, 0, 0)"),
+      std::string::npos);
+  const SourceVolume mended =
+      read(write({density, diagonal, vector_grid("sggx_off_diagonal", density, vec3(9, 0, 0))}));
+  EXPECT_TRUE(has_warning(mended, "1 voxels have matrices that are no SGGX"));
+  EXPECT_TRUE(has_warning(read(write({density, vector_grid("sggx_diagonal", density, vec3(0.0f)), rest})),
+                          "1 voxels have no SGGX"));
 }
 
 TEST_F(ReadVolume, LevelSetsBecomeFogOnlyWhenAsked) {

@@ -30,7 +30,15 @@ TEST(VoxelShape, KeepsTurnsAndMirrors) {
 
 TEST(VoxelShape, SaysWhatIsNoCube) {
   EXPECT_EQ(voxel_shape({dvec3(2, 0, 0), dvec3(0, 1, 0), dvec3(0, 0, 1)}).other_shape, "2 x 1 x 1");
-  EXPECT_EQ(voxel_shape({dvec3(1, 0, 0), dvec3(0.6, 0.8, 0), dvec3(0, 0, 1)}).other_shape, "1 x 1 x 1, sheared");
+  EXPECT_EQ(voxel_shape({dvec3(2, 0, 0), dvec3(0, 1, 0), dvec3(0, 0, 1)}).size, 1.0);
+  const VoxelShape sheared = voxel_shape({dvec3(0, 0, 1), dvec3(0, -0.8, 0.6), dvec3(2, 0, 0)});
+  EXPECT_EQ(sheared.other_shape, "1 x 1 x 2, sheared");
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::array<dvec3, 3> edges = {dvec3(0, 0, 1), dvec3(0, -0.8, 0.6), dvec3(2, 0, 0)};
+    EXPECT_LT(glm::distance(sheared.rotation * sheared.edges[axis], edges[static_cast<size_t>(axis)]), 1e-14);
+    for (int row = axis + 1; row < 3; ++row) EXPECT_EQ(sheared.edges[axis][row], 0.0);
+  }
+  EXPECT_TRUE(voxel_shape({dvec3(1, 0, 0), dvec3(1, 1, 0), dvec3(0, 1, 0)}).is_singular);
   EXPECT_TRUE(voxel_shape({dvec3(1, 0, 0), dvec3(0.0), dvec3(0, 0, 1)}).is_singular);
   EXPECT_TRUE(voxel_shape({dvec3(NAN, 0, 0), dvec3(0, 1, 0), dvec3(0, 0, 1)}).is_singular);
   EXPECT_FALSE(voxel_shape({dvec3(INFINITY, 0, 0), dvec3(0, 1, 0), dvec3(0, 0, 1)}).is_cube());
