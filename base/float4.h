@@ -4,6 +4,8 @@
 
 #include <cstring>
 
+#include "base/vec.h"
+
 namespace farfield {
 
 using Float4 = float __attribute__((vector_size(16)));
@@ -13,6 +15,8 @@ inline Float4 load4(const float* from) {
   std::memcpy(&v, from, sizeof v);
   return v;
 }
+/// A point or a direction; the fourth lane is 0.
+inline Float4 load_xyz(const vec3& v) { return Float4{v.x, v.y, v.z, 0.0f}; }
 inline void store4(float* to, const Float4& v) { std::memcpy(to, &v, sizeof v); }
 inline Float4 splat4(float x) { return Float4{x, x, x, x}; }
 

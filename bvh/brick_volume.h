@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "base/float4.h"
 #include "base/vec.h"
 #include "cache/level.h"
 
@@ -36,25 +37,31 @@ struct RayRange {
   float t_far;
   bool is_empty() const { return !(t_near <= t_far); }
 };
+/// Of origin and direction the first three lanes count.
+inline RayRange clip_to_box(const Float4& origin, const Float4& direction, float t_near, float t_far, const Box3& box) {
+  const Float4 inverse = 1.0f / direction;
+  // Parallel rays give infinities of the right signs, or NaN (0 * infinity) in the plane of a side: min4 and max4 keep
+  // their first argument then, which leaves the range as it is.
+  const Float4 lower = load4(&box.lower.x), last_four = load4(&box.lower.z);  // not beyond the box
+  const Float4 upper = __builtin_shufflevector(last_four, last_four, 1, 2, 3, 3);
+  const Float4 a = (lower - origin) * inverse;
+  const Float4 b = (upper - origin) * inverse;
+  const Float4 near = max4(splat4(t_near), min4(a, b)), far = min4(splat4(t_far), max4(a, b));
+  return {std::max(std::max(near[0], near[1]), near[2]), std::min(std::min(far[0], far[1]), far[2])};
+}
 inline RayRange clip_to_box(const LocalRay& ray, const Box3& box) {
-  RayRange range{ray.t_near, ray.t_far};
-  for (int axis = 0; axis < 3; ++axis) {
-    const float inverse = 1.0f / ray.direction[axis];
-    // Parallel rays give infinities of the right signs, or NaN (0 * infinity) in the plane of a side: std::min and
-    // std::max keep their first argument then, which leaves the range as it is.
-    const float a = (box.lower[axis] - ray.origin[axis]) * inverse;
-    const float b = (box.upper[axis] - ray.origin[axis]) * inverse;
-    range.t_near = std::max(range.t_near, std::min(a, b));
-    range.t_far = std::min(range.t_far, std::max(a, b));
-  }
-  return range;
+  return clip_to_box(load_xyz(ray.origin), load_xyz(ray.direction), ray.t_near, ray.t_far, box);
 }
 
-/// No NaN, no infinity, and nothing beyond what Embree takes (1.8e18). Zero directions are traceable.
-inline bool is_traceable(const LocalRay& ray) {
-  const auto size = [](const vec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); };  // glm::abs branches
-  return size(ray.origin) + size(ray.direction) <= 1.8e18f;
+/// The largest coordinate that Embree takes.
+inline constexpr float kEmbreeLargest = 1.8e18f;
+
+/// No NaN, no infinity, and nothing beyond what Embree takes. Zero directions are traceable. The same lanes count.
+inline bool is_traceable(const Float4& origin, const Float4& direction) {
+  const Float4 size = abs4(origin) + abs4(direction);
+  return size[0] + size[1] + size[2] <= kEmbreeLargest;
 }
+inline bool is_traceable(const LocalRay& ray) { return is_traceable(load_xyz(ray.origin), load_xyz(ray.direction)); }
 
 /// The microflake volume of a level, as rays see it. Refers to the level's arrays. Immutable; any thread.
 class BrickVolume {

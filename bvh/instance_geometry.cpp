@@ -63,21 +63,6 @@ RayLanes to_local(const InstanceRecord& record, const EmbreeRay& ray) {
           with_w_of(record.vector_to_local(world.direction), world.direction)};
 }
 
-/// is_traceable() of lanes.
-bool is_traceable(const RayLanes& ray) {
-  const Float4 size = abs4(ray.origin) + abs4(ray.direction);
-  return size[0] + size[1] + size[2] <= 1.8e18f;
-}
-
-/// clip_to_box() of lanes.
-RayRange clip_to_box(const RayLanes& ray, float t_far, const Box3& box) {
-  const Float4 inverse = 1.0f / ray.direction;
-  const Float4 a = (load4(&box.lower.x) - ray.origin) * inverse;
-  const Float4 b = (load4(&box.upper.x) - ray.origin) * inverse;
-  const Float4 near = max4(splat4(ray.origin[3]), min4(a, b)), far = min4(splat4(t_far), max4(a, b));
-  return {std::max(std::max(near[0], near[1]), near[2]), std::min(std::min(far[0], far[1]), far[2])};
-}
-
 /// Random bits of a ray in an instance.
 uint64_t bits_of_ray(const RayContext& context, uint32_t instance) { return mix64(context.ray_seed, instance); }
 
@@ -104,8 +89,8 @@ inline bool InstanceGeometry::choose(const InstanceRecord& record, uint32_t inst
                                      const RayContext& context, Visit& visit) const {
   const TracedAsset& asset = *assets[record.asset];
   visit.ray = to_local(record, ray);
-  if (!is_traceable(visit.ray)) return false;
-  const RayRange range = clip_to_box(visit.ray, ray.tfar, asset.bounds);
+  if (!is_traceable(visit.ray.origin, visit.ray.direction)) return false;
+  const RayRange range = clip_to_box(visit.ray.origin, visit.ray.direction, ray.tnear, ray.tfar, asset.bounds);
   if (!(range.t_near * (1.0f - kRangePad) <= range.t_far * (1.0f + kRangePad))) return false;
   visit.t_entry = range.t_near;
   visit.choice = choose_level(asset, record.footprint, record.limits, instance, context, range.t_near, forced_lambda);

@@ -13,8 +13,6 @@ namespace {
 // World bounds grow by this fraction of their size and of their distance from the origin: the transform of a ray there
 // rounds by a few times 2^-24 of the coordinates it adds up.
 constexpr float kRelativePad = 1e-6f;
-// The largest coordinate that Embree takes: see is_traceable().
-constexpr float kEmbreeLargest = 1.8e18f;
 
 glm::dmat3 linear_part(const mat4x3& m) { return {glm::dvec3(m[0]), glm::dvec3(m[1]), glm::dvec3(m[2])}; }
 
