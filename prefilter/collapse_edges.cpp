@@ -16,6 +16,7 @@
 #include "prefilter/material_filter.h"
 #include "prefilter/surface_parts.h"
 #include "prefilter/vertex_placement.h"
+#include "prefilter/vertex_stars.h"
 
 namespace farfield {
 
@@ -55,14 +56,19 @@ class CollapsibleMesh {
 
   /// Call once the arrays of positions, triangles and materials are filled.
   void build_topology() {
-    build_stars();
+    merged_into.resize(positions.size());
+    std::iota(merged_into.begin(), merged_into.end(), 0u);
+    is_face_alive.assign(triangles.size(), 1);
+    version.assign(positions.size(), 0);
+    deviation.assign(positions.size(), 0.0);
+    stars_ = VertexStars(positions.size(), triangles.size(), [&](uint32_t face, const auto& visit) {
+      for (int c = 0; c < 3; ++c) visit(triangles[face][c]);
+    });
     find_winding();
   }
 
   /// The living faces around a vertex. Valid until the next merge().
-  std::span<const uint32_t> star(uint32_t vertex) const {
-    return std::span(star_faces_).subspan(stars_[vertex].begin, stars_[vertex].size);
-  }
+  std::span<const uint32_t> star(uint32_t vertex) const { return stars_.of(vertex); }
 
   bool has_corner(uint32_t face, uint32_t vertex) const {
     const uvec3& t = triangles[face];
@@ -94,7 +100,7 @@ class CollapsibleMesh {
     for (const uint32_t face : collapsing) {
       is_face_alive[face] = 0;
       for (int c = 0; c < 3; ++c) {
-        if (triangles[face][c] != a && triangles[face][c] != b) remove_from_star(triangles[face][c], face);
+        if (triangles[face][c] != a && triangles[face][c] != b) stars_.remove(triangles[face][c], face);
       }
     }
     for (const uint32_t face : kept) {
@@ -103,44 +109,13 @@ class CollapsibleMesh {
       }
     }
     merged_into[b] = a;
-    stars_[b] = {};
-    // The new star goes to the end; what it leaves behind is bounded by the number of collapses times a star's size.
-    stars_[a] = {static_cast<uint32_t>(star_faces_.size()), static_cast<uint32_t>(kept.size())};
-    star_faces_.insert(star_faces_.end(), kept.begin(), kept.end());
+    stars_.clear(b);
+    stars_.replace(a, kept);
     ++version[a];
     ++version[b];
   }
 
  private:
-  struct Star {
-    uint32_t begin = 0, size = 0;
-  };
-
-  void build_stars() {
-    merged_into.resize(positions.size());
-    std::iota(merged_into.begin(), merged_into.end(), 0u);
-    is_face_alive.assign(triangles.size(), 1);
-    version.assign(positions.size(), 0);
-    deviation.assign(positions.size(), 0.0);
-    stars_.assign(positions.size(), Star{});
-    for (const uvec3& t : triangles) {
-      for (int c = 0; c < 3; ++c) ++stars_[t[c]].size;
-    }
-    uint32_t begin = 0;
-    for (Star& star : stars_) {
-      star.begin = begin;
-      begin += star.size;
-      star.size = 0;
-    }
-    star_faces_.resize(begin);
-    for (uint32_t face = 0; face < triangles.size(); ++face) {
-      for (int c = 0; c < 3; ++c) {
-        Star& star = stars_[triangles[face][c]];
-        star_faces_[star.begin + star.size++] = face;
-      }
-    }
-  }
-
   /// Lets neighbouring faces agree on a winding, outwards from the first face of each sheet.
   void find_winding() {
     const EdgeTable edges = build_edge_table(triangles, positions.size());
@@ -174,14 +149,7 @@ class CollapsibleMesh {
     }
   }
 
-  void remove_from_star(uint32_t vertex, uint32_t face) {
-    Star& star = stars_[vertex];
-    uint32_t* const begin = star_faces_.data() + star.begin;
-    star.size = static_cast<uint32_t>(std::remove(begin, begin + star.size, face) - begin);
-  }
-
-  std::vector<Star> stars_;
-  std::vector<uint32_t> star_faces_;
+  VertexStars stars_;
 };
 
 /// Collapses the edges of one mesh.

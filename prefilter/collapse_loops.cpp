@@ -319,11 +319,9 @@ class LoopCollapser {
         continue;
       }
       if (left != count) return false;
-      const auto halves = triangles_of(mesh_.face(polygon));
-      for (int half = 0; half < count - 2; ++half) {
-        const uvec3& t = halves[static_cast<size_t>(half)];
+      visit_halves(mesh_.face(polygon), [&](int half, const uvec3& t) {
         kept_.push_back({polygon, half, {mapped(t.x), mapped(t.y), mapped(t.z)}});
-      }
+      });
     }
     return !kept_.empty();
   }
@@ -362,11 +360,8 @@ class LoopCollapser {
   void place() {
     double before = 0;
     for (const uint32_t polygon : affected_) {
-      const auto halves = triangles_of(mesh_.face(polygon));
-      for (int half = 0; half < corner_count(mesh_.face(polygon)) - 2; ++half) {
-        const uvec3& t = halves[static_cast<size_t>(half)];
-        before += glm::length(area_vector(corners_at(t)));
-      }
+      visit_halves(mesh_.face(polygon),
+                   [&](int, const uvec3& t) { before += glm::length(area_vector(corners_at(t))); });
     }
     new_positions_.clear();
     for (const Group& group : groups_) new_positions_.push_back(part_.positions[group.target]);
@@ -424,13 +419,10 @@ class LoopCollapser {
     star.erase(std::unique(star.begin(), star.end()), star.end());
     for (const uint32_t v : vertices_of(group)) ring_.samples_before.push_back(position(v));
     for (const uint32_t polygon : star) {
-      const PolygonCorners& corners = mesh_.face(polygon);
-      const auto halves = triangles_of(corners);
-      for (int half = 0; half < corner_count(corners) - 2; ++half) {
-        uvec3 t = halves[static_cast<size_t>(half)];
+      visit_halves(mesh_.face(polygon), [&](int, uvec3 t) {
         if (is_flipped_[polygon]) std::swap(t.y, t.z);
         const int c = is_of_group(t.x) ? 0 : is_of_group(t.y) ? 1 : is_of_group(t.z) ? 2 : -1;
-        if (c < 0) continue;
+        if (c < 0) return;
         ring_.before.push_back({position(t.x), position(t.y), position(t.z)});
         const uint32_t q = t[(c + 1) % 3], s = t[(c + 2) % 3];
         if (!collapses(polygon)) ring_.after.push_back({after(q), after(s)});
@@ -438,7 +430,7 @@ class LoopCollapser {
           ring_.samples_before.push_back(0.5 * (position(t[c]) + position(v)));
           if (!is_of_group(v) && ring_marks_.add(mapped(v))) ring_.neighbours_after.push_back(after(v));
         }
-      }
+      });
     }
   }
 
@@ -448,8 +440,8 @@ class LoopCollapser {
       for (const uint32_t v : vertices_of(group)) group.longest_before = std::max(group.longest_before, longest_at(v));
     }
     for (const auto& [polygon, half, t] : kept_) {
-      const uvec3 old = triangles_of(mesh_.face(polygon))[static_cast<size_t>(half)];
-      if (!keeps_face(corners_at(old), {after(t.x), after(t.y), after(t.z)})) return false;
+      if (!keeps_face(corners_at(half_of(mesh_.face(polygon), half)), {after(t.x), after(t.y), after(t.z)}))
+        return false;
     }
     return std::ranges::all_of(affected_,
                                [&](uint32_t polygon) { return collapses(polygon) || has_short_sides(polygon); });
@@ -523,14 +515,11 @@ class LoopCollapser {
   void add_link(uint32_t v) {
     for (const uint32_t polygon : mesh_.star(v)) {
       if (collapses(polygon)) continue;
-      const PolygonCorners& corners = mesh_.face(polygon);
-      const auto halves = triangles_of(corners);
-      for (int half = 0; half < corner_count(corners) - 2; ++half) {
-        const uvec3& t = halves[static_cast<size_t>(half)];
+      visit_halves(mesh_.face(polygon), [&](int, const uvec3& t) {
         for (int c = 0; c < 3; ++c) {
           if (t[c] == v) link_.push_back({mapped(t[(c + 1) % 3]), mapped(t[(c + 2) % 3])});
         }
-      }
+      });
     }
   }
 
@@ -638,14 +627,12 @@ class LoopCollapser {
     std::vector<uint32_t> triangles;
     std::vector<FaceMaterial> materials;
     for (const auto& [set, polygon] : members) {
-      const auto halves = triangles_of(mesh_.face(polygon));
-      for (int half = 0; half < corner_count(mesh_.face(polygon)) - 2; ++half) {
-        const uvec3& t = halves[static_cast<size_t>(half)];
+      visit_halves(mesh_.face(polygon), [&](int half, const uvec3& t) {
         before.push_back(glm::length(area_vector(corners_at(t))));
         now.push_back(collapses(polygon) ? 0.0 : glm::length(area_vector({after(t.x), after(t.y), after(t.z)})));
         triangles.push_back(part_.triangles[polygon][static_cast<size_t>(half)]);
         materials.push_back(part_.materials[triangles.back()]);
-      }
+      });
     }
     filter_materials(before, now, materials);
     for (size_t i = 0; i < triangles.size(); ++i) part_.materials[triangles[i]] = materials[i];

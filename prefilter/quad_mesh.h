@@ -2,13 +2,13 @@
 // Quads and triangles over shared vertices, which may merge: the topology that face loops run through.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "base/index.h"
 #include "base/vec.h"
+#include "prefilter/vertex_stars.h"
 
 namespace farfield {
 
@@ -17,10 +17,14 @@ using PolygonCorners = uvec4;
 
 inline int corner_count(const PolygonCorners& face) { return face.w == kNoIndex ? 3 : 4; }
 
-/// The halves of a quad, or the triangle itself and one of kNoIndex.
-inline std::array<uvec3, 2> triangles_of(const PolygonCorners& face) {
-  const uvec3 second = face.w == kNoIndex ? uvec3(kNoIndex) : uvec3(face.z, face.w, face.x);
-  return {uvec3(face.x, face.y, face.z), second};
+/// Half 0 or 1 of a quad, or half 0 of a triangle: itself.
+inline uvec3 half_of(const PolygonCorners& face, int half) {
+  return half == 0 ? uvec3(face.x, face.y, face.z) : uvec3(face.z, face.w, face.x);
+}
+/// Calls visit(half, its corners) for the halves of a quad, or a triangle itself.
+template <typename Visit>
+void visit_halves(const PolygonCorners& face, const Visit& visit) {
+  for (int half = 0; half < corner_count(face) - 2; ++half) visit(half, half_of(face, half));
 }
 
 /// Faces that collapsed stay in the arrays, marked. One thread at a time; all that is const may be called by many.
@@ -30,15 +34,13 @@ class QuadMesh {
   QuadMesh(std::vector<PolygonCorners> faces, size_t vertex_count);
 
   size_t face_count() const { return faces_.size(); }
-  size_t vertex_count() const { return stars_.size(); }
+  size_t vertex_count() const { return stars_.vertex_count(); }
   const PolygonCorners& face(uint32_t face) const { return faces_[face]; }
   bool is_quad(uint32_t face) const { return faces_[face].w != kNoIndex; }
   bool is_alive(uint32_t face) const { return is_alive_[face]; }
 
   /// The living faces around a vertex. Valid until the next merge().
-  std::span<const uint32_t> star(uint32_t vertex) const {
-    return std::span(star_faces_).subspan(stars_[vertex].begin, stars_[vertex].size);
-  }
+  std::span<const uint32_t> star(uint32_t vertex) const { return stars_.of(vertex); }
 
   /// What lies beyond a face's edge ab: one face, kNoIndex at a border, or kNotManifold where there are more.
   static constexpr uint32_t kNotManifold = 0xfffffffeu;
@@ -52,14 +54,10 @@ class QuadMesh {
   void merge(std::span<const uint32_t> vertices);
 
  private:
-  struct Star {
-    uint32_t begin = 0, size = 0;
-  };
-
   std::vector<PolygonCorners> faces_;
   std::vector<uint8_t> is_alive_;
-  std::vector<Star> stars_;
-  std::vector<uint32_t> star_faces_;
+  VertexStars stars_;
+  std::vector<uint32_t> merged_star_;  ///< of the merge at hand: its memory is reused
 };
 
 }  // namespace farfield
