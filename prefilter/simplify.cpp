@@ -43,11 +43,17 @@ SimplifyResult compose(SimplifyResult first, SimplifyResult then) {
   return {std::move(then.surface), std::move(first.vertex_map), std::move(first.face_map)};
 }
 
-/// Loops of what is quads, edges of what is not.
-SimplifyResult collapse_loops_first(const Surface& surface, double resolution, const Job& job) {
+/// Loops of what is quads, edges of what is not. is_unwanted: per face, those whose parts nobody asks for, which may
+/// stay as they are; empty: none.
+SimplifyResult collapse_loops_first(const Surface& surface, const std::vector<uint8_t>& is_unwanted, double resolution,
+                                    const Job& job) {
   LoopCollapseResult loops = collapse_loops(surface, resolution, job);
-  const std::vector<uint8_t> is_quad = find_quads(loops.simplified.surface);
-  SimplifyResult edges = collapse_edges(loops.simplified.surface, {resolution, is_quad, loops.deviation}, job);
+  std::vector<uint8_t> is_fixed = find_quads(loops.simplified.surface);
+  for (size_t f = 0; f < is_unwanted.size(); ++f) {
+    const uint32_t left = loops.simplified.face_map[f];
+    if (is_unwanted[f] && left != kMorphCollapsed) is_fixed[left] = 1;
+  }
+  SimplifyResult edges = collapse_edges(loops.simplified.surface, {resolution, is_fixed, loops.deviation}, job);
   return compose(std::move(loops.simplified), std::move(edges));
 }
 
@@ -133,7 +139,11 @@ SimplifyResult choose_and_simplify(const Surface& surface, double resolution, co
   const SurfaceParts parts = find_parts(surface);
   std::vector<uint8_t> chosen = find_quad_parts(surface, parts);
   if (std::ranges::count(chosen, 1) == 0) return edges;
-  const SimplifyResult loops = collapse_loops_first(surface, resolution, job);
+  std::vector<uint8_t> is_unwanted(surface.triangles.size());
+  for (size_t part = 0; part < parts.size(); ++part) {
+    for (const uint32_t f : parts.faces_of(part)) is_unwanted[f] = !chosen[part];
+  }
+  const SimplifyResult loops = collapse_loops_first(surface, is_unwanted, resolution, job);
   leave_out_badly_structured(parts, loops, edges, chosen);
   if (std::ranges::count(chosen, 1) == 0) return edges;
   return PartChooser(surface, loops, edges).choose(parts, chosen);
@@ -165,7 +175,7 @@ SimplifyResult simplify(const Surface& macrosurface, const SimplifyOptions& opti
     result.surface.quad.clear();  // nobody asks for them any more
     return result;
   }
-  if (options.method == SimplifyMethod::Loops) return collapse_loops_first(macrosurface, options.resolution, job);
+  if (options.method == SimplifyMethod::Loops) return collapse_loops_first(macrosurface, {}, options.resolution, job);
   return choose_and_simplify(macrosurface, options.resolution, job);
 }
 
