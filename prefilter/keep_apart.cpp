@@ -12,8 +12,8 @@
 
 #include "base/index.h"
 #include "base/parallel.h"
-#include "prefilter/disjoint_sets.h"
 #include "prefilter/ray_scene.h"
+#include "prefilter/surface_parts.h"
 
 namespace farfield {
 
@@ -70,19 +70,13 @@ std::optional<vec3> direction_of(const vec3& v) {
   return length > 0 && std::isfinite(length) ? std::optional(v / length) : std::nullopt;
 }
 
-/// Per vertex the part of the surface that is connected to it, named by a vertex of it.
-std::vector<uint32_t> parts_of_vertices(const Surface& surface) {
-  DisjointSets sets(surface.positions.size());
-  for (const uvec3& t : surface.triangles) sets.join(t.x, t.y), sets.join(t.x, t.z);
-  std::vector<uint32_t> parts(surface.positions.size());
-  for (uint32_t v = 0; v < parts.size(); ++v) parts[v] = sets.least_of(v);
-  return parts;
-}
-
-bool is_one_part(const Surface& surface, const std::vector<uint32_t>& parts) {
-  return surface.triangles.empty() || std::ranges::all_of(surface.triangles, [&](const uvec3& t) {
-           return parts[t.x] == parts[surface.triangles[0].x];
-         });
+/// Per vertex the number of its part; kNoIndex: no face uses it.
+std::vector<uint32_t> parts_of_vertices(const Surface& surface, const SurfaceParts& parts) {
+  std::vector<uint32_t> part_of(surface.positions.size(), kNoIndex);
+  for (uint32_t part = 0; part < parts.size(); ++part) {
+    for (const uint32_t vertex : parts.vertices_of(part)) part_of[vertex] = part;
+  }
+  return part_of;
 }
 
 /// Of the input vertices that became an output vertex, the one that is nearest to it.
@@ -109,6 +103,11 @@ class Walls {
         start_(after.surface.positions) {
     part_.resize(sources_.size());
     for (size_t w = 0; w < part_.size(); ++w) part_[w] = sources_[w] == kNoIndex ? kNoIndex : part_before_[sources_[w]];
+    first_face_.assign(part_.size(), kNoIndex);
+    for (uint32_t f = 0; f < surface_.triangles.size(); ++f) {
+      for (int c = 0; c < 3; ++c)
+        first_face_[surface_.triangles[f][c]] = std::min(first_face_[surface_.triangles[f][c]], f);
+    }
   }
 
   Result<ApartReport> keep_apart() {
@@ -231,10 +230,11 @@ class Walls {
     std::array<uint32_t, 3> corners;
   };
 
-  /// Calls visit(Sample) for corners, middles of sides and the middle of a face, as far as all corners that each is
-  /// between lie beside the same part.
+  /// Calls visit(Sample) for corners (each in the first face that has it), middles of sides and the middle of a face,
+  /// as far as all corners that each is between lie beside the same part.
   template <typename Visit>
-  void visit_samples(const uvec3& t, Visit&& visit) const {
+  void visit_samples(uint32_t face, Visit&& visit) const {
+    const uvec3& t = surface_.triangles[face];
     const auto at = [&](uint32_t v) { return surface_.positions[v]; };
     for (const Neighbour& first : sides_[t.x])
       visit_shared(first, t, [&](const Neighbour& side) {
@@ -244,7 +244,7 @@ class Walls {
       const uint32_t v = t[c], w = t[(c + 1) % 3];
       for (const Neighbour& first : sides_[v]) {
         if (first.part == kNoIndex) continue;
-        visit(Sample{at(v), first, {v, v, v}});
+        if (first_face_[v] == face) visit(Sample{at(v), first, {v, v, v}});
         visit_shared(first, {v, w, w}, [&](const Neighbour& side) {
           visit(Sample{0.5f * (at(v) + at(w)), side, {v, w, w}});
         });
@@ -286,7 +286,7 @@ class Walls {
       for (size_t task = begin; task < end; ++task) {
         const size_t last = std::min(surface_.triangles.size(), (task + 1) * kGrain);
         for (size_t f = task * kGrain; f < last; ++f) {
-          visit_samples(surface_.triangles[f], [&](const Sample& sample) {
+          visit_samples(static_cast<uint32_t>(f), [&](const Sample& sample) {
             const auto found = crossing(scene, sample.point, sample.side);
             if (found) pushes[task].push_back(push_of(sample, *found));
           });
@@ -360,6 +360,7 @@ class Walls {
   const std::vector<uint32_t> sources_;      ///< per vertex after: the vertex before that stands for it
   const std::vector<vec3> start_;            ///< positions after the simplification
   std::vector<uint32_t> part_;               ///< per vertex after
+  std::vector<uint32_t> first_face_;         ///< per vertex after, of those that have it
   std::vector<Sides> sides_;                 ///< per vertex after
   std::map<PartPair, PairSums> pairs_;
 };
@@ -367,9 +368,10 @@ class Walls {
 }  // namespace
 
 Result<ApartReport> keep_apart(const Surface& macrosurface, float resolution, SimplifyResult& simplified) {
-  std::vector<uint32_t> parts = parts_of_vertices(macrosurface);
-  if (!(resolution > 0) || is_one_part(macrosurface, parts)) return ApartReport{};
-  return Walls(macrosurface, resolution, simplified, std::move(parts)).keep_apart();
+  if (!(resolution > 0)) return ApartReport{};
+  const SurfaceParts parts = find_parts(macrosurface);
+  if (parts.size() < 2) return ApartReport{};
+  return Walls(macrosurface, resolution, simplified, parts_of_vertices(macrosurface, parts)).keep_apart();
 }
 
 }  // namespace farfield
