@@ -87,31 +87,10 @@ void set_medium(const SourceVolume& source, LevelHeader& header) {
   header.open_side = length > kMostOpenSide ? flakes.open_side * (kMostOpenSide / length) : flakes.open_side;
 }
 
-template <typename T, typename Pack>
-std::vector<T> pack_each(const std::vector<FlakeLook>& looks, const Pack& pack) {
-  std::vector<T> packed;
-  packed.reserve(looks.size());
-  for (const FlakeLook& look : looks) packed.push_back(pack(look));
-  return packed;
-}
-
-/// As pack_volume() has them of surfaces' flakes.
-void pack_looks(const std::vector<FlakeLook>& looks, LevelData& level) {
-  level.voxel_diffuse = pack_colors(looks, [](const FlakeLook& look) { return look.diffuse; });
-  level.voxel_specular = pack_colors(looks, [](const FlakeLook& look) { return look.specular; });
-  level.voxel_transmission = pack_colors(looks, [](const FlakeLook& look) { return look.transmission; });
-  level.voxel_emission = pack_each<PackedRadiance>(looks, [](const FlakeLook& l) { return pack_radiance(l.emission); });
-  level.voxel_octants = pack_each<PackedOctants>(looks, [](const FlakeLook& look) { return look.octants; });
-  drop_if_all(level.voxel_diffuse, PackedColor{});
-  drop_if_all(level.voxel_specular, PackedColor{});
-  drop_if_all(level.voxel_transmission, PackedColor{});
-  drop_if_all(level.voxel_emission, PackedRadiance{});
-  drop_if_all(level.voxel_octants, kFullOctants);
-  if (level.voxel_specular.empty()) return;
-  level.voxel_roughness2 = pack_each<uint8_t>(looks, [](const FlakeLook& look) {
-    const float alpha = look.roughness * look.roughness;
-    return pack_unorm8(alpha * alpha);
-  });
+/// alpha^2, of GGX.
+float roughness2_of(const FlakeLook& look) {
+  const float alpha = look.roughness * look.roughness;
+  return alpha * alpha;
 }
 
 /// Makes a level from its bricks. voxels_of(brick, voxels): false where the brick is empty; called from many threads.
@@ -160,7 +139,7 @@ Result<LevelData> pack_bricks(const SourceVolume& source, const ivec3& dims, dou
   drop_if_all(level.voxel_self_shadowing, uint8_t{255});
   drop_if_all(level.voxel_anisotropy, pack_anisotropy(source.anisotropy));
   drop_if_all(level.voxel_sggx, pack_flake_sggx(SymMat3::identity()));
-  if (source.flakes) pack_looks(looks, level);
+  if (source.flakes) pack_looks(looks, roughness2_of, level);
   for_each_brick(level, [&](const Brick& brick, const ivec3& coordinates) {
     const Box3 voxels = active_box(brick);
     const dvec3 corner = dvec3(coordinates * kBrickSide);
@@ -230,8 +209,7 @@ Result<LevelData> pack_fog(const SourceVolume& source, uint32_t level, Downsampl
     // In parallel here, too: a root has few bricks.
     parallel_for(voxels.size(), 16, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) {
-        const auto v = static_cast<int>(i);
-        const ivec3 voxel(v & 7, v >> 3 & 7, v >> 6);
+        const ivec3 voxel = voxel_in_brick(static_cast<int>(i));
         const bool is_inside = voxel.x < inside.x && voxel.y < inside.y && voxel.z < inside.z;
         if (!is_inside || job.is_cancelled())
           voxels[i] = FogVoxel();

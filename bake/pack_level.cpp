@@ -196,15 +196,6 @@ void sort_along_curve(const Surface& surface, std::vector<Pair>& pairs) {
 // ---------------------------------------------------------------------------------------------------------------
 // Channels. A channel is packed, and left out when all of it is the default.
 
-template <typename Packed, typename Source, typename Pack>
-std::vector<Packed> pack_each(const std::vector<Source>& source, const Pack& pack) {
-  std::vector<Packed> packed(source.size());
-  parallel_for(source.size(), 4096, [&](size_t begin, size_t end) {
-    for (size_t i = begin; i < end; ++i) packed[i] = pack(source[i]);
-  });
-  return packed;
-}
-
 /// Largest difference between entries of two matrices.
 float distance(const SymMat3& a, const SymMat3& b) {
   return std::max({std::abs(a.xx - b.xx), std::abs(a.yy - b.yy), std::abs(a.zz - b.zz), std::abs(a.xy - b.xy),
@@ -376,23 +367,12 @@ LevelData pack_volume(const SparseVolume& volume) {
   level.header.highlight_lean = volume.highlight_lean;
   const auto& voxels = volume.voxels;
   level.voxel_sggx = pack_each<PackedFlakeSggx>(voxels, [](const auto& v) { return pack_flake_sggx(v.sggx); });
-  level.voxel_diffuse = pack_colors(voxels, [](const auto& v) { return v.diffuse; });
-  level.voxel_specular = pack_colors(voxels, [](const auto& v) { return v.specular; });
-  level.voxel_transmission = pack_colors(voxels, [](const auto& v) { return v.transmission; });
   level.voxel_self_shadowing =
       pack_each<uint8_t>(voxels, [](const auto& v) { return std::max<uint8_t>(pack_unorm8(v.self_shadowing), 1); });
-  level.voxel_octants = pack_each<PackedOctants>(voxels, [](const auto& v) { return v.octants; });
   drop_if_all(level.voxel_sggx, pack_flake_sggx(SymMat3::identity()));
-  drop_if_all(level.voxel_diffuse, PackedColor{});
-  drop_if_all(level.voxel_specular, PackedColor{});
-  drop_if_all(level.voxel_transmission, PackedColor{});
   drop_if_all(level.voxel_self_shadowing, uint8_t{255});
-  drop_if_all(level.voxel_octants, kFullOctants);
-  level.voxel_emission = pack_each<PackedRadiance>(voxels, [](const auto& v) { return pack_radiance(v.emission); });
-  drop_if_all(level.voxel_emission, PackedRadiance{});
-  if (!level.voxel_specular.empty()) {
-    level.voxel_roughness2 = pack_each<uint8_t>(voxels, [](const auto& v) { return pack_unorm8(v.roughness2); });
-  }
+  pack_looks(
+      voxels, [](const Voxel& v) { return v.roughness2; }, level);
   return level;
 }
 

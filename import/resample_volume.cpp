@@ -130,7 +130,7 @@ class Resampler {
       const size_t count = std::min(kBatch, entries - first);
       parallel_for(count, 4, [&](size_t begin, size_t end) {
         for (size_t i = begin; i < end; ++i) {
-          const ivec3 brick = coordinates(first + i);
+          const ivec3 brick = out_.brick_of_entry(first + i);
           only[i] = only_brick(brick);
           const bool is_known = only[i] == kEmptyBrick || is_shared(only[i]);
           batch[i] = is_known ? std::nullopt : new_brick(brick);
@@ -144,12 +144,6 @@ class Resampler {
       }
     }
     return {};
-  }
-
-  ivec3 coordinates(size_t entry) const {
-    const auto e = static_cast<int>(entry);
-    const ivec3& n = out_.brick_dims;
-    return {e % n.x, e / n.x % n.y, e / (n.x * n.y)};
   }
 
   /// What else is in even bricks may differ.
@@ -182,7 +176,7 @@ class Resampler {
     NewBrick made;
     bool is_empty = true;
     for (int i = 0; i < kVolumeBrickVoxels; ++i) {
-      const ivec3 voxel = brick * kVolumeBrickSide + ivec3(i & 7, i >> 3 & 7, i >> 6);
+      const ivec3 voxel = brick * kVolumeBrickSide + voxel_in_brick(i);
       if (glm::any(glm::greaterThanEqual(voxel, out_.dims))) continue;
       is_empty = !sample(voxel, static_cast<size_t>(i), made) && is_empty;
     }

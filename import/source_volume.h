@@ -49,6 +49,11 @@ struct DensityGrid {
            static_cast<size_t>(brick_dims.x) *
                (static_cast<size_t>(brick.y) + static_cast<size_t>(brick_dims.y) * static_cast<size_t>(brick.z));
   }
+  /// The coordinates that table_index() has an entry from.
+  ivec3 brick_of_entry(size_t entry) const {
+    const auto e = static_cast<int>(entry);
+    return {e % brick_dims.x, e / brick_dims.x % brick_dims.y, e / (brick_dims.x * brick_dims.y)};
+  }
   /// Index of the brick at these coordinates, in bricks; kEmptyBrick also outside of the grid.
   uint32_t brick_at(const ivec3& brick) const {
     for (int axis = 0; axis < 3; ++axis)
@@ -89,5 +94,7 @@ struct SourceVolume : DensityGrid {
 inline size_t index_in_brick(const ivec3& voxel) {
   return static_cast<size_t>((voxel.x & 7) | (voxel.y & 7) << 3 | (voxel.z & 7) << 6);
 }
+/// The voxel with that index, from its brick's first.
+inline ivec3 voxel_in_brick(int index) { return {index & 7, index >> 3 & 7, index >> 6}; }
 
 }  // namespace farfield

@@ -102,11 +102,10 @@ class ChannelReader {
     for (size_t entry = 0; entry < volume_.brick_table.size(); ++entry) {
       const uint32_t index = volume_.brick_table[entry];
       if (index == kEmptyBrick) continue;
-      const auto e = static_cast<int>(entry);
-      const ivec3 n = volume_.brick_dims, corner = ivec3(e % n.x, e / n.x % n.y, e / (n.x * n.y)) * kVolumeBrickSide;
+      const ivec3 corner = volume_.brick_of_entry(entry) * kVolumeBrickSide;
       for (int i = 0; i < kVolumeBrickVoxels; ++i) {
         if (!(volume_.bricks[index][static_cast<size_t>(i)] > 0)) continue;
-        const ivec3 v = corner + ivec3(i & 7, i >> 3 & 7, i >> 6);
+        const ivec3 v = corner + voxel_in_brick(i);
         visit(Place{index, static_cast<size_t>(i), from_.first_voxel + Coord(v.x, v.y, v.z)});
       }
     }

@@ -394,14 +394,12 @@ Result<DensityGrid> matched_densities(const SourceVolume& source, uint32_t level
   const size_t entries = static_cast<size_t>(n.x) * static_cast<size_t>(n.y) * static_cast<size_t>(n.z);
   grid.brick_table.assign(entries, kEmptyBrick);
   for (size_t entry = 0; entry < entries; ++entry) {
-    const auto e = static_cast<int>(entry);
-    const ivec3 corner = ivec3(e % n.x, e / n.x % n.y, e / (n.x * n.y)) * kVolumeBrickSide;
+    const ivec3 corner = grid.brick_of_entry(entry) * kVolumeBrickSide;
     DensityBrick brick;
     ShapeBrick shapes;
     parallel_for(brick.size(), 32, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end && !job.is_cancelled(); ++i) {
-        const auto v = static_cast<int>(i);
-        const ivec3 voxel = corner + ivec3(v & 7, v >> 3 & 7, v >> 6);
+        const ivec3 voxel = corner + voxel_in_brick(static_cast<int>(i));
         const bool is_inside = glm::all(glm::lessThan(voxel, grid.dims));
         const auto [density, s] = is_inside ? downsampler.attenuation(voxel) : FogDownsampler::Attenuation();
         brick[i] = density;
