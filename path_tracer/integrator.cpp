@@ -106,14 +106,18 @@ bool PathTracer::is_occluded(const PathRay& ray, float distance) {
   return trace_occlusion(scene_.embree, context.embree, shadow_ray);
 }
 
-// The ray from a vertex into sample.wi. Its cone starts as wide as the incoming one is there.
+// The ray from a vertex into sample.wi. Its cone starts as wide as the incoming one is there, and spreads as directions
+// lie apart that scattering *and* the light's own sampling draw: towards a sun they lie close, and a lobe's wide cone
+// would take the shadows of trees from their coarsest levels.
 PathRay PathTracer::leave(const Interaction& vertex, const ScatterSample& sample, const PathRay& incoming) const {
   const float distance = glm::length(vertex.position - incoming.origin);
   PathRay ray;
   ray.origin = vertex.ray_origin(sample.wi);
   ray.direction = sample.wi;
   ray.cone_width = incoming.cone_width + incoming.cone_spread * distance;
-  ray.cone_spread = vertex.next_cone_spread(sample, incoming.cone_spread);
+  ScatterSample drawn = sample;
+  drawn.pdf += lights_.environment.pdf(sample.wi);
+  ray.cone_spread = vertex.next_cone_spread(drawn, incoming.cone_spread);
   ray.scatter_pdf = sample.pdf;
   return ray;
 }
@@ -178,8 +182,8 @@ void PathTracer::add_point_lights(const Interaction& vertex, const PathRay& inco
     if (falloff <= 0) continue;
     vec3 scattered = vertex.eval(wi, rng_);
     if (!is_worth_a_ray(vertex, scattered)) continue;
-    const ScatterSample as_scattered{wi, vec3(0.0f), vertex.pdf(wi)};
-    const PathRay ray = leave(vertex, as_scattered, incoming);
+    const ScatterSample only_way{wi, vec3(0.0f), kInfinity};  // spreads no cone
+    const PathRay ray = leave(vertex, only_way, incoming);
     if (is_occluded(ray, glm::length(light.position - ray.origin))) continue;
     add(scattered * light.intensity * (falloff / distance2));
   }

@@ -316,6 +316,36 @@ TEST_F(PathTraceScene, ShuttersBlurWhatMoves) {
   }
 }
 
+// A sun's shadow is as sharp as the sun is small: a lobe's wide cone would take it from the coarsest level.
+TEST_F(PathTraceScene, ShadowsOfASunComeFromFineLevels) {
+  const auto thorn = folder_->path() / "thorn.farfield";
+  test::write_asset(thorn, {test::sphere_level({0, 0, 0}, 0.1f, 16, 0, 0.02f),
+                            test::sphere_level({0, 0, 0}, 1.0f, 16, 5, 0.64f)});
+  const AssetId asset = *runtime_->open_asset(thorn.string());
+  mat4x3 above(1.0f);
+  above[3] = vec3(0, 10, 0);
+  const auto instance = runtime_->add_instance(asset, above);
+  ASSERT_TRUE(instance);
+  scene_ = std::move(*make_scene(device_.get(), *runtime_));
+  DistantLight sun;
+  sun.irradiance = vec3(1.0f);
+  lights_.environment = Environment::constant(vec3(0.0f)).with({&sun, 1});
+  const int side = 120;
+  const Camera camera = Camera::orthographic({0, 0, 10}, {0, 0, -1}, {0, 1, 0}, 2.4f, side, side);
+  TraceOptions options;
+  options.samples_per_pixel = 4;
+  options.max_depth = 1;  // what scatters on may see coarse levels
+  const auto seen_between = [&](uint8_t finest, uint8_t coarsest) {
+    EXPECT_TRUE(runtime_->set_level_limits(*instance, {finest, coarsest}));
+    Film film(side, side);
+    EXPECT_TRUE(trace(camera, film, options));
+    return film.image().values;
+  };
+  const std::vector<float> chosen = seen_between(0, 5);
+  EXPECT_EQ(chosen, seen_between(0, 0));
+  EXPECT_NE(chosen, seen_between(5, 5));
+}
+
 TEST_F(PathTraceScene, CancelStopsEarly) {
   Film film(256, 256);
   TraceOptions options;
