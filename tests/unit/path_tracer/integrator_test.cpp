@@ -319,8 +319,8 @@ TEST_F(PathTraceScene, ShuttersBlurWhatMoves) {
 // A sun's shadow is as sharp as the sun is small: a lobe's wide cone would take it from the coarsest level.
 TEST_F(PathTraceScene, ShadowsOfASunComeFromFineLevels) {
   const auto thorn = folder_->path() / "thorn.farfield";
-  test::write_asset(thorn, {test::sphere_level({0, 0, 0}, 0.1f, 16, 0, 0.02f),
-                            test::sphere_level({0, 0, 0}, 1.0f, 16, 5, 0.64f)});
+  test::write_asset(
+      thorn, {test::sphere_level({0, 0, 0}, 0.1f, 16, 0, 0.02f), test::sphere_level({0, 0, 0}, 1.0f, 16, 5, 0.64f)});
   const AssetId asset = *runtime_->open_asset(thorn.string());
   mat4x3 above(1.0f);
   above[3] = vec3(0, 10, 0);
