@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <span>
+#include <utility>
 
 namespace farfield {
 namespace {
@@ -24,17 +27,29 @@ std::array<vec3, 12> icosahedron_vertices() {
   return vertices;
 }
 
-/// Reorders so that each direction is the one farthest from all before it (ties: the first).
+/// How near a vertex is to the nearest of others: its axis, then itself. In quarters, rounded: cosines between vertices
+/// are 1 or 1 / sqrt(5), or the negative.
+std::pair<long, long> nearness(const vec3& vertex, std::span<const vec3> others) {
+  std::pair<long, long> nearest{-4, -4};
+  for (const vec3& other : others) {
+    const float cosine = glm::dot(vertex, other);
+    nearest.first = std::max(nearest.first, std::lround(4.0f * std::abs(cosine)));
+    nearest.second = std::max(nearest.second, std::lround(4.0f * cosine));
+  }
+  return nearest;
+}
+
+/// Reorders so that each direction is the one farthest from all before it (ties: the first), axes first: opposite views
+/// have the same outline, so they tell nothing of coverage. Means of even functions over the six axes are exact up to
+/// the fifth degree.
 void order_farthest_first(std::array<vec3, 12>& directions) {
   for (size_t chosen = 1; chosen < directions.size(); ++chosen) {
-    size_t best = chosen;
-    float best_cosine = 2.0f;
-    for (size_t i = chosen; i < directions.size(); ++i) {
-      float nearest = -1.0f;  // cosine to the nearest direction chosen so far
-      for (size_t j = 0; j < chosen; ++j) nearest = std::max(nearest, glm::dot(directions[i], directions[j]));
-      if (nearest < best_cosine - 1e-4f) best = i, best_cosine = nearest;
-    }
-    std::swap(directions[chosen], directions[best]);
+    const auto is_farther = [&](const vec3& a, const vec3& b) {
+      const std::span before(directions.data(), chosen);
+      return nearness(a, before) < nearness(b, before);
+    };
+    const auto first = directions.begin() + static_cast<std::ptrdiff_t>(chosen);
+    std::iter_swap(first, std::min_element(first, directions.end(), is_farther));
   }
 }
 

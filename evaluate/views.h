@@ -22,8 +22,8 @@ struct OrthoView {
 };
 
 /// `count` directions (unit, the way the camera looks) spread over the sphere. Up to 12: vertices of the icosahedron
-/// around the origin, each as far as possible from those before it, so that a prefix is spread too. More: a Fibonacci
-/// lattice. Count <= 0: none.
+/// around the origin, its six axes from one side, then from the other; each as far as possible from those before it, so
+/// that a prefix is spread too. More: a Fibonacci lattice. Count <= 0: none.
 std::vector<vec3> view_directions(int count);
 
 /// The picture of `bounds` along `direction` with pixels of `pixel_size` (> 0): the smallest one of whole pixels that
