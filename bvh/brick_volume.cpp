@@ -102,6 +102,7 @@ struct BrickVolume::Flight {
   FlightRandom random;
   float s_hit = 0;
   uint32_t payload_hit = 0;
+  float rate_hit = 0;  ///< of true attenuation there, per s
 };
 
 BrickVolume::BrickVolume(const LevelView& level)
@@ -149,6 +150,7 @@ bool BrickVolume::cross_octants(Flight& flight, const ivec3& voxel, const vec3& 
                          const float depth = rate_here * (leave - enter);
                          if (depth_left < depth) {
                            flight.s_hit = enter + depth_left / rate_here;
+                           flight.rate_hit = rate_here;
                            return false;
                          }
                          depth_left -= depth;
@@ -179,6 +181,7 @@ bool BrickVolume::cross_brick(Flight& flight, const Brick& brick, const ivec3& b
         const vec3 entry = flight.entry - corner;
         const int octant = octant_at(entry + flight.s_hit * flight.direction, walk.cell);
         const float acceptance = sigma * octant_share(octants_of(flight.payload_hit), octant);
+        flight.rate_hit = rate * acceptance;
         if (acceptance >= 1.0f || flight.random.uniform() < acceptance) return true;
         if (cross_octants(flight, walk.cell, entry, rate * sigma, flight.s_hit, s_next)) return true;
         flight.depth_left = flight.random.optical_depth();
@@ -213,7 +216,9 @@ bool BrickVolume::skim_brick(Flight& flight, const Brick& brick, const ivec3& br
     flight.s_hit = s;
     flight.payload_hit = brick.payload_index(voxel);
     const float share_here = share * octant_share(octants_of(flight.payload_hit), octant_at(p, cell));
-    if (u * bound < share_here * projected_area(flight.payload_hit, flight.unit_direction)) return true;
+    const float area = share_here * projected_area(flight.payload_hit, flight.unit_direction);
+    flight.rate_hit = brick.density_scale * flight.speed * area;
+    if (u * bound < area) return true;
   }
 }
 
@@ -283,7 +288,10 @@ std::optional<VolumeHit> BrickVolume::first_collision(const LocalRay& ray, uint6
       const bool is_faint = brick.density_scale * bound * (s_exit - s) <= kMostSkimmed;
       const bool hits =
           is_faint ? skim_brick(flight, brick, walk.cell, s, s_next) : cross_brick(flight, brick, walk.cell, s, s_next);
-      if (hits) return VolumeHit{std::min(range.t_near + flight.s_hit, range.t_far), flight.payload_hit};
+      if (hits) {
+        return VolumeHit{std::min(range.t_near + flight.s_hit, range.t_far), flight.payload_hit,
+                         flight.rate_hit * share};
+      }
     }
     if (s_next >= s_end || !walk.step(flight.sign, brick_delta, brick_dims_)) return std::nullopt;
     s = std::max(s, s_next);
@@ -333,6 +341,25 @@ float BrickVolume::optical_depth(const LocalRay& ray) const {
     if (s_next >= course.s_end || !walk.step(sign, brick_delta, brick_dims_)) return sum;
     s = std::max(s, s_next);
   }
+}
+
+float BrickVolume::attenuation_at(const vec3& point, const vec3& direction) const {
+  const float speed = glm::length(direction);
+  const vec3 p = (point - origin_) * inverse_voxel_size_;
+  const vec3 end = vec3(brick_dims_ * kBrickSide);
+  const bool is_inside = p.x >= 0 && p.y >= 0 && p.z >= 0 && p.x < end.x && p.y < end.y && p.z < end.z;  // no NaN
+  if (is_empty() || !is_inside || !(speed > 0.0f && speed < kInfinity)) return 0;
+  const ivec3 cell(p), brick_cell = cell / kBrickSide, in_brick = cell % kBrickSide;
+  const uint32_t index = brick_table_[brick_table_index(brick_dims_, brick_cell)];
+  if (index == kNoBrick) return 0;
+  const Brick& brick = bricks_[index];
+  const int voxel = in_brick.x + kBrickSide * (in_brick.y + kBrickSide * in_brick.z);
+  const uint8_t density = brick.density[static_cast<size_t>(voxel)];
+  if (density == 0) return 0;
+  const uint32_t payload = brick.payload_index(voxel);
+  const float rho = static_cast<float>(density) * brick.density_scale * (1.0f / 255.0f);
+  return rho * octant_share(octants_of(payload), octant_at(p, cell)) * projected_area(payload, direction / speed) *
+         speed;
 }
 
 }  // namespace farfield

@@ -17,8 +17,9 @@ inline constexpr float kMostSkimmed = 2.0f;
 
 /// A collision with a flake.
 struct VolumeHit {
-  float t;           ///< ray parameter
-  uint32_t payload;  ///< index into the voxel sections
+  float t;            ///< ray parameter
+  uint32_t payload;   ///< index into the voxel sections
+  float attenuation;  ///< that the flight had there, per unit of t: rho sqrt(d^T S d), times the share
 };
 
 /// A ray in the local space of a level: points origin + t * direction, t in [t_near, t_far]. The direction need not be
@@ -81,6 +82,8 @@ class BrickVolume {
   /// That integral over [t_near, t_far], up to rounding: exp(-optical_depth) of the light passes. 0 where there is no
   /// collision.
   float optical_depth(const LocalRay& ray) const;
+  /// What that integral grows by per unit of t at a point: rho sqrt(d^T S d). 0 outside.
+  float attenuation_at(const vec3& point, const vec3& direction) const;
 
  private:
   struct Flight;

@@ -133,6 +133,7 @@ bool InstanceGeometry::intersect_level(const Visit& visit, uint64_t ray_bits, Em
       made.level_slot = static_cast<uint8_t>(level.slot);
       made.is_volume = true;
       made.element = collision->payload;
+      made.attenuation = collision->attenuation;
       return true;
     }
   }
@@ -158,6 +159,7 @@ bool InstanceGeometry::intersect_morph(const Visit& visit, uint64_t ray_bits, Em
   made.is_coarser = found->is_coarser;
   made.element = found->element;
   made.barycentric[0] = found->barycentric.x, made.barycentric[1] = found->barycentric.y;
+  made.attenuation = found->attenuation;
   return true;
 }
 

@@ -313,7 +313,7 @@ std::optional<MorphHit> TracedMorph::intersect(EmbreeRayHit& ray_hit, EmbreeCont
   bool is_coarser = false;
   if (const auto collision = first_collision(local_ray(ray_hit.ray), t, ray_bits, is_coarser)) {
     ray_hit.ray.tfar = collision->t;
-    result = MorphHit{true, is_coarser, collision->payload, {}};
+    result = MorphHit{true, is_coarser, collision->payload, {}, collision->attenuation};
   }
   return result;
 }

@@ -20,9 +20,10 @@ namespace farfield {
 /// Where a ray met a morph.
 struct MorphHit {
   bool is_volume;
-  bool is_coarser;   ///< `element` is of the coarser level, else of the finer
-  uint32_t element;  ///< 2 * quad + side, or payload of a voxel
-  vec2 barycentric;  ///< weights of the face's second and third corner
+  bool is_coarser;        ///< `element` is of the coarser level, else of the finer
+  uint32_t element;       ///< 2 * quad + side, or payload of a voxel
+  vec2 barycentric;       ///< weights of the face's second and third corner
+  float attenuation = 0;  ///< VolumeHit::attenuation; volumes only
 };
 
 /// A morph in memory. Immutable; any thread. Does not move: its scene refers to it.

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
@@ -29,6 +30,11 @@ struct NewBrick {
   AlbedoBrick albedos{};
   ShapeBrick shapes{};
   NumberBrick anisotropies{}, self_shadowing{};
+  struct Flakes {
+    ColorBrick diffuse{}, specular{}, transmission{}, emission{};
+    NumberBrick roughness{};
+  };
+  std::unique_ptr<Flakes> flakes;  ///< of fog none
 };
 
 class Resampler {
@@ -41,11 +47,16 @@ class Resampler {
     out_.anisotropy = source.anisotropy;
     out_.warnings = source.warnings;
     out_.source_hash = source.source_hash;
+    if (source.flakes) {
+      const SourceFlakes& of_source = *source.flakes;
+      SourceFlakes& flakes = out_.flakes.emplace();
+      flakes.hot_spot = of_source.hot_spot;
+      flakes.highlight_lean = of_source.highlight_lean;
+      flakes.open_side = of_source.open_side;
+    }
   }
 
   Result<SourceVolume> run() {
-    if (source_.flakes)
-      return make_error(ErrorCode::Unsupported, "flakes on voxels that are no cubes; resample it to uniform voxels");
     FARFIELD_TRY(place());
     for (size_t i = 0; i < source_.bricks.size(); ++i) is_even_.push_back(is_even(source_.bricks[i]));
     FARFIELD_TRY(fill());
@@ -148,8 +159,8 @@ class Resampler {
 
   /// What else is in even bricks may differ.
   bool is_shared(uint32_t brick) const {
-    const bool is_density_alone = source_.albedos.empty() && source_.shapes.empty() && source_.anisotropies.empty() &&
-                                  source_.self_shadowing.empty();
+    const bool is_density_alone = !source_.flakes && source_.albedos.empty() && source_.shapes.empty() &&
+                                  source_.anisotropies.empty() && source_.self_shadowing.empty();
     return brick < kManyBricks && is_even_[brick] && is_density_alone;
   }
 
@@ -159,7 +170,18 @@ class Resampler {
     if (!source_.shapes.empty()) out_.shapes.push_back(brick.shapes);
     if (!source_.anisotropies.empty()) out_.anisotropies.push_back(brick.anisotropies);
     if (!source_.self_shadowing.empty()) out_.self_shadowing.push_back(brick.self_shadowing);
+    if (brick.flakes) add(*brick.flakes);
     return static_cast<uint32_t>(out_.bricks.size() - 1);
+  }
+
+  void add(const NewBrick::Flakes& brick) {
+    const SourceFlakes& from = *source_.flakes;
+    SourceFlakes& to = *out_.flakes;
+    if (!from.diffuse.empty()) to.diffuse.push_back(brick.diffuse);
+    if (!from.specular.empty()) to.specular.push_back(brick.specular);
+    if (!from.transmission.empty()) to.transmission.push_back(brick.transmission);
+    if (!from.emission.empty()) to.emission.push_back(brick.emission);
+    if (!from.roughness.empty()) to.roughness.push_back(brick.roughness);
   }
 
   uint32_t shared_brick(uint32_t of_source) {
@@ -174,13 +196,14 @@ class Resampler {
 
   std::optional<NewBrick> new_brick(const ivec3& brick) const {
     NewBrick made;
+    if (source_.flakes) made.flakes = std::make_unique<NewBrick::Flakes>();
     bool is_empty = true;
     for (int i = 0; i < kVolumeBrickVoxels; ++i) {
       const ivec3 voxel = brick * kVolumeBrickSide + voxel_in_brick(i);
       if (glm::any(glm::greaterThanEqual(voxel, out_.dims))) continue;
       is_empty = !sample(voxel, static_cast<size_t>(i), made) && is_empty;
     }
-    return is_empty ? std::nullopt : std::optional(made);
+    return is_empty ? std::nullopt : std::optional(std::move(made));
   }
 
   /// A point of a cube that has a density.
@@ -235,6 +258,20 @@ class Resampler {
       made.self_shadowing[i] =
           static_cast<float>(mean([&](const Hit& h) { return source_.self_shadowing[h.brick][h.voxel]; }));
     }
+    if (made.flakes) mix_flakes(hits, i, *made.flakes);
+  }
+
+  void mix_flakes(std::span<const Hit> hits, size_t i, NewBrick::Flakes& made) const {
+    const auto mean = [&](const auto& bricks, auto& brick) {
+      if (bricks.empty()) return;
+      for (const Hit& hit : hits) brick[i] += static_cast<float>(hit.share) * bricks[hit.brick][hit.voxel];
+    };
+    const SourceFlakes& flakes = *source_.flakes;
+    mean(flakes.diffuse, made.diffuse);
+    mean(flakes.specular, made.specular);
+    mean(flakes.transmission, made.transmission);
+    mean(flakes.emission, made.emission);
+    mean(flakes.roughness, made.roughness);
   }
 
   /// The sum of all densities, and in `active` how many there are.

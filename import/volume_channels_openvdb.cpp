@@ -7,13 +7,13 @@
 #include <cmath>
 #include <initializer_list>
 
+#include "import/voxel_ellipsoid.h"
+
 namespace farfield {
 namespace {
 
 using openvdb::Coord;
 using Matrix = glm::dmat3;
-
-constexpr double kRounding = 1e-3;  ///< of entries of S that no ellipsoid has, before it is said
 
 /// "_level_3" of "density_level_3", a grid of several levels as OpenVDB's tools and ours name them; else nothing.
 std::string level_suffix(const std::string& name) {
@@ -253,7 +253,7 @@ class ChannelReader {
           const std::array<float, 6>& s = volume_.shapes[p.brick][p.voxel];
           Matrix m(s[0], s[3], s[4], s[3], s[1], s[5], s[4], s[5], s[2]);
           if (!(m[0][0] + m[1][1] + m[2][2] > 0)) return ++round, Matrix(1.0);
-          mended += mend(m);
+          mended += mend_ellipsoid(m);
           return to_grid * m * volume_.rotation;
         },
         [&] {
@@ -262,24 +262,6 @@ class ChannelReader {
         });
   }
 
-  /// Makes the diagonal >= 0 and correlations at most 1; whether it was not by more than rounding.
-  static bool mend(Matrix& m) {
-    const double unit = kRounding * (m[0][0] + m[1][1] + m[2][2]);
-    bool is_off = false;
-    for (int i = 0; i < 3; ++i) {
-      is_off = is_off || m[i][i] < -unit;
-      m[i][i] = std::max(m[i][i], 0.0);
-    }
-    for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3;
-      const double most = std::sqrt(m[i][i] * m[j][j]);
-      is_off = is_off || std::abs(m[i][j]) > most + unit;
-      m[i][j] = m[j][i] = std::clamp(m[i][j], -most, most);
-    }
-    return is_off;
-  }
-
-  /// Flakes whose normals are upright to the fibre, roughly [Heitz et al. 2015, section 4.2].
   Result<void> read_fibres() {
     std::vector<ColorBrick> directions;
     FARFIELD_TRY_LET(const bool is_there,
@@ -289,15 +271,13 @@ class ChannelReader {
                      }));
     if (!is_there) return {};
     volume_.shapes.resize(volume_.bricks.size());
-    const double along = from_.options.fibre_roughness * from_.options.fibre_roughness;
     const Matrix to_grid = glm::transpose(volume_.rotation);
     uint64_t round = 0;
     return set_shapes(
         [&](const Place& p) {
           const dvec3 d = to_grid * dvec3(directions[p.brick][p.voxel]);
-          const double length = glm::length(d);
-          if (!(length > 0)) return ++round, Matrix(1.0);
-          return Matrix(1.0) - (1 - along) * glm::outerProduct(d / length, d / length);
+          if (!(glm::length(d) > 0)) return ++round, Matrix(1.0);
+          return fibre_ellipsoid(d, from_.options.fibre_roughness);
         },
         [&] {
           if (round > 0) warn("{} voxels have no direction: they stop alike from all sides", round);
@@ -309,16 +289,8 @@ class ChannelReader {
   Result<void> set_shapes(const Shape& shape, const Say& say) {
     volume_.densest = 0;
     for_each_place([&](const Place& p) {
-      const Matrix m = shape(p);
-      const double trace = m[0][0] + m[1][1] + m[2][2];
-      const dvec3 diagonal = dvec3(m[0][0], m[1][1], m[2][2]) / trace, rest = dvec3(m[0][1], m[0][2], m[1][2]) / trace;
-      std::array<float, 6>& s = volume_.shapes[p.brick][p.voxel];
-      for (int i = 0; i < 3; ++i) {
-        s[static_cast<size_t>(i)] = static_cast<float>(diagonal[i]);
-        s[static_cast<size_t>(3 + i)] = static_cast<float>(rest[i]);
-      }
       float& density = volume_.bricks[p.brick][p.voxel];
-      density = static_cast<float>(std::min(static_cast<double>(density) * std::sqrt(trace), kDensestVolume));
+      put_ellipsoid(shape(p), volume_.shapes[p.brick][p.voxel], density);
       volume_.densest = std::max(volume_.densest, density);
     });
     say();

@@ -84,6 +84,7 @@ BakeFog to_fog(const py::dict& fields) {
   }
   fog.anisotropy = fields["anisotropy"].cast<double>();
   fog.level_set = fields["level_set"].cast<bool>();
+  fog.fibre_roughness = fields["fibre_roughness"].cast<double>();
   return fog;
 }
 
@@ -152,9 +153,9 @@ py::dict bake_arrays(const std::string& folder, const std::string& name, const p
   return to_dict(call.run([&] { return bake_meshes(input, folder, limits); }));
 }
 
-/// density: (depth, height, width); albedo: None, or the same with three channels.
+/// density: (depth, height, width); channels: what else voxels have, a row of numbers for each, or None.
 py::dict bake_density(const std::string& folder, const std::string& name, const Array<float>& density,
-                      const py::object& albedo, const py::object& to_asset, const py::dict& settings,
+                      const py::dict& channels, const py::object& to_asset, const py::dict& settings,
                       const py::object& progress) {
   LongCall call(progress);
   KeptArrays arrays;
@@ -164,7 +165,11 @@ py::dict bake_density(const std::string& folder, const std::string& name, const 
   volume.height = static_cast<uint32_t>(density.shape(1));
   volume.width = static_cast<uint32_t>(density.shape(2));
   volume.density = BakeRows<1>(density.data(), static_cast<size_t>(density.size()));
-  volume.albedo = to_rows<3, float>(albedo, arrays);
+  volume.albedo = to_rows<3, float>(channels["albedo"], arrays);
+  volume.sggx = to_rows<6, float>(channels["sggx"], arrays);
+  volume.fibre = to_rows<3, float>(channels["fibre"], arrays);
+  volume.anisotropy = to_rows<1, float>(channels["anisotropy"], arrays);
+  volume.self_shadowing = to_rows<1, float>(channels["self_shadowing"], arrays);
   volume.to_asset = to_matrix(to_asset);
   const BakeSettings limits = to_settings(settings, call, !progress.is_none());
   return to_dict(call.run([&] { return bake_volume(volume, folder, limits); }));

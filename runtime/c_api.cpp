@@ -146,6 +146,8 @@ FfInteraction to_c(const Interaction& in, const InstanceData& data) {
   out.uv[0] = in.uv.x, out.uv[1] = in.uv.y;
   out.instance_data.id = data.id;
   copy(data.tint, out.instance_data.tint);
+  out.sigma_t = in.sigma_t;
+  copy(in.reflectance.fog, out.fog), out.anisotropy = in.reflectance.anisotropy;
   std::memcpy(out.state, static_cast<const void*>(&in), sizeof in);
   return out;
 }

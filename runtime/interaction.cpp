@@ -178,6 +178,17 @@ SurfaceParams blended(const SurfaceParams& a, const SurfaceParams& b, float t) {
   return mixed;
 }
 
+/// Per unit of the ray's parameter, at a collision: what the flight had of the volume that it met, and in a morph what
+/// the other one adds there.
+float attenuation(const HitLevels& levels, const InstanceRecord& instance, const HitRecord& hit, const vec3& position,
+                  const vec3& direction) {
+  if (!levels.morph) return hit.attenuation;
+  const TracedLevel& other = hit.is_coarser ? levels.morph->fine() : levels.morph->coarse();
+  const float share = hit.is_coarser ? 1 - hit.blend : hit.blend;
+  return hit.attenuation +
+         share * other.volume.attenuation_at(instance.point_to_local(position), instance.vector_to_local(direction));
+}
+
 /// How a face reflects at a hit.
 struct FaceShading {
   SurfaceParams params;
@@ -267,6 +278,9 @@ Interaction make_interaction(const HitLevels& levels, const InstanceRecord& inst
   interaction.lambda = hit.lambda;
   interaction.uv = glm::vec2(NAN);
 
+  if (hit.is_volume) {
+    interaction.sigma_t = attenuation(levels, instance, hit, interaction.position, direction) / glm::length(direction);
+  }
   if (hit.is_volume && view.header.medium == Medium::Fog) {
     interaction.kind = Interaction::Kind::Volume;
     const FogParams params = world_fog_params(view, instance, hit.element);

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Levels of volumes by each way of downsampling, as the tables of docs/results/volumes.md.
 
-Usage: scripts/measure_volumes.py FARFIELD WORK VDB[:FLAGS] ...
+Usage: scripts/measure_volumes.py FARFIELD WORK NAME=VDB[:FLAGS] ...
 
-FARFIELD: the command. WORK: a folder for assets and figures; what is there is not made again. VDB:FLAGS: a volume and the
-flags of `farfield bake` for it: "smoke.vdb:--density-scale 2". Standard library only."""
+FARFIELD: the command. WORK: a folder for assets and figures; what is there is not made again. NAME=VDB:FLAGS: a name of
+its own for a volume and the flags of `farfield bake` for it: "dense=cloud.vdb:--density-scale 40". In brackets behind
+errors: standard errors in their last digits, of all that is left of noise in both pictures. Standard library only."""
 
 import json
 import pathlib
@@ -15,7 +16,7 @@ import sys
 
 METHODS = ["linear", "transp", "iso", "aniso", "matched"]
 LIGHTS = ["daylight", "front", "behind"]
-SAMPLES = {"1-2": 12, "3-9": 256}  # per pixel and light: coarse levels have few pixels
+SAMPLES = {"1-2": 12, "3": 256, "4-9": 768}  # per pixel and light: coarse levels have few pixels
 
 
 def run(command):
@@ -26,8 +27,8 @@ def run(command):
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def measure(farfield, work, volume, flags, method):
-    name = f"{volume.stem}_{method}"
+def measure(farfield, work, title, volume, flags, method):
+    name = f"{title}_{method}"
     asset, figures, times = work / f"{name}.farfield", work / f"{name}.json", work / f"{name}.seconds"
     if not figures.exists():
         times.write_text(str(run([farfield, "bake", volume, "-o", asset, "--downsampling", method, *flags])))
@@ -43,19 +44,26 @@ def measure(farfield, work, volume, flags, method):
     return json.loads(figures.read_text()), manifest, float(times.read_text())
 
 
+def percent(value, error, digits):
+    """+3.9(4): 3.9 with a standard error of 0.4."""
+    return f"{100 * value:+.{digits}f}({round(100 * error * 10**digits)})"
+
+
 def mean_bias(light):
-    return 100 * sum(light["color_bias"]) / 3
+    errors = light["standard_errors"]["color_bias"]  # channels share their paths: their mean is not better
+    return percent(sum(light["color_bias"]) / 3, sum(errors) / 3, 1)
 
 
-def rows_of(volume, flags, farfield, work):
+def rows_of(title, volume, flags, farfield, work):
     for method in METHODS:
-        levels, manifest, seconds = measure(farfield, work, volume, flags, method)
+        levels, manifest, seconds = measure(farfield, work, title, volume, flags, method)
         first = manifest["levels"][0]
         entries = {entry["level"]: entry for entry in manifest["levels"]}
         for level in levels:
             entry = entries[level["level"]]
-            biases = [f"{mean_bias(light):+.1f}" for light in level["lights"]]
-            yield (method, level["level"], f"{level['grid']}^3", f"{100 * level['occlusion_error']:+.2f}", *biases,
+            occlusion = percent(level["occlusion_error"], level["standard_errors"]["occlusion_error"], 2)
+            biases = [mean_bias(light) for light in level["lights"]]
+            yield (method, level["level"], f"{level['grid']}^3", occlusion, *biases,
                    f"{100 * entry['file_bytes'] / first['file_bytes']:.2f}",
                    f"{100 * entry['file_bytes'] / volume.stat().st_size:.2f}",
                    f"{100 * entry['ray_cost'] / first['ray_cost']:.0f}", f"{seconds:.1f}")
@@ -67,13 +75,14 @@ def main():
     farfield, work = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
     work.mkdir(parents=True, exist_ok=True)
     for word in sys.argv[3:]:
-        path, _, flags = word.partition(":")
+        title, _, place = word.partition("=")
+        path, _, flags = place.partition(":")
         volume, flags = pathlib.Path(path), flags.split()
-        print(f"\n### {volume.name} {' '.join(flags)}\n")
+        print(f"\n### {title}: `{volume.name} {' '.join(flags)}`\n")
         print("| method | level | grid | occlusion, % | daylight, % | front, % | behind, % | bytes of level 0, % "
               "| of the .vdb, % | ray cost of level 0, % | bake, CPU s |")
         print("|" + "---|" * 11)
-        for row in sorted(rows_of(volume, flags, farfield, work), key=lambda row: row[1]):
+        for row in sorted(rows_of(title, volume, flags, farfield, work), key=lambda row: row[1]):
             print("| " + " | ".join(str(cell) for cell in row) + " |", flush=True)
 
 

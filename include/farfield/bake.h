@@ -193,6 +193,15 @@ struct BakeVolume {
   uint32_t width = 0, height = 0, depth = 0;
   BakeRows<1> density;  ///< width * height * depth, x fastest, then y, then z: finite, >= 0; at least one above 0
   BakeRows<3> albedo;   ///< the same of linear RGB in [0, 1], single scattering. None: BakeFog::albedo
+  /// The same of matrices S of SGGX, xx, yy, zz, xy, xz, yz along the asset's axes: sigma_t(w) = density sqrt(w^T S w).
+  /// All 0: alike from all sides. None, or:
+  BakeRows<6> sggx;
+  /// The same of directions of fibres along the asset's axes, of any length: the density is what is stopped across them
+  /// (BakeFog::fibre_roughness). 0: alike from all sides. One of these two at most.
+  BakeRows<3> fibre;
+  BakeRows<1> anisotropy;      ///< g of each voxel, from -0.98 to 0.98. None: BakeFog::anisotropy
+  BakeRows<1> self_shadowing;  ///< share, in (0, 1], of scattered light that leaves a voxel at once; without
+                               ///< `anisotropy` alone. None: 1
   /// Voxel (i, j, k) is where this puts the cube [i, i + 1] x [j, j + 1] x [k, k + 1]: any affine map. Where
   /// that is no cube, the fog is resampled onto cubes of the shortest edge, and a warning says so.
   glm::dmat4x3 to_asset{1.0};
@@ -205,6 +214,7 @@ struct BakeFog {
   std::optional<glm::vec3> albedo;  ///< single scattering, linear RGB in [0, 1]; none: the volume's own, or 0.99
   double anisotropy = 0;            ///< mean cosine of scattering, -0.98 to 0.98 (Henyey-Greenstein)
   bool level_set = false;           ///< of an OpenVDB file: take a level set for the fog inside it; else it is refused
+  double fibre_roughness = 0.1;     ///< what a fibre stops along itself by what it stops across; in [0, 1]
 };
 
 /// How levels of a volume are made (docs/decisions/0026).

@@ -167,7 +167,9 @@ typedef struct FfInteraction {
   uint32_t material, source_face;                                                     /* 0xffffffff: unknown */
   float barycentric[2], uv[2];
   FfInstanceData instance_data;
-  uint64_t state[80]; /* the library's: how light scatters */
+  uint64_t state[80];       /* the library's: how light scatters */
+  float sigma_t;            /* volumes: extinction along the ray, 1 / world unit; 0 on surfaces */
+  float fog[3], anisotropy; /* farfield::Reflectance */
 } FfInteraction;
 /* Set interaction->size to sizeof(FfInteraction) before. Of what is no hit of ours: FF_OK, and kind is FF_NONE. Use it
  * before the next ff_plan_frame(). */

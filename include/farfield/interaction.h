@@ -58,6 +58,10 @@ class FARFIELD_API Interaction {
   glm::vec3 albedo{0.0f};            ///< of highlight and base together, for AOVs and denoisers
   Reflectance reflectance;           ///< what albedo is made of
   glm::vec3 emission{0.0f};          ///< radiance that leaves the point along wo by itself
+  /// Volumes: extinction coefficient along the ray, 1 / world unit, with which free flights come to collisions here:
+  /// density times projected area; in a blend that morphs, of both levels. Instances that overlap count for
+  /// themselves. 0 on surfaces.
+  float sigma_t = 0;
 
   // For a host that shades level 0 with its own materials; at coarser levels unknown: prefiltered faces have none.
   uint32_t material = kNoMaterial;     ///< id of the source's material; its name: Runtime::material_name()

@@ -24,6 +24,7 @@ struct HitRecord {
   float footprint = 0;                ///< world width of what the ray stands for there
   float normal_local[3] = {0, 0, 0};  ///< geometric normal, instance space, unnormalised; surfaces only
   float barycentric[2] = {0, 0};      ///< weights of the face's second and third corner; surfaces only
+  float attenuation = 0;              ///< of the medium that was met there, per unit of tfar; volumes only
 };
 
 namespace detail {

@@ -169,6 +169,7 @@ def bake_file(
     albedo: float | Sequence[float] | None = None,
     anisotropy: float = 0.0,
     level_set: bool = False,
+    fibre_roughness: float = 0.1,
     downsampling: str = "matched",
     source_only: bool = False,
     subdivide: str = "none",
@@ -184,7 +185,7 @@ def bake_file(
     one alone, in its own space; -1 is the whole scene. Of volumes alone: density_grid (without it "density", or the only
     fog volume), level_set (take one for the fog inside it), and what bake_volume() has; their grids are their own."""
     settings = _settings(coarsest_grid, source_only, threads, memory_limit, finest_grid, rays_per_voxel)
-    settings |= _fog(density_scale, albedo, anisotropy, downsampling, density_grid, level_set)
+    settings |= _fog(density_scale, albedo, anisotropy, downsampling, density_grid, level_set, fibre_roughness)
     settings |= _subdivision(subdivide, subdivide_error, subdivide_edge, subdivide_boundary, subdivide_uv)
     return _farfield.bake_file(os.fspath(source), os.fspath(out), mesh, settings, progress)
 
@@ -199,7 +200,11 @@ def bake_volume(
     coarsest_grid: int = 8,
     density_scale: float = 1.0,
     albedo: npt.ArrayLike | None = None,
-    anisotropy: float = 0.0,
+    anisotropy: npt.ArrayLike = 0.0,
+    sggx: npt.ArrayLike | None = None,
+    fibre: npt.ArrayLike | None = None,
+    fibre_roughness: float = 0.1,
+    self_shadowing: npt.ArrayLike | None = None,
     downsampling: str = "matched",
     source_only: bool = False,
     threads: int = 0,
@@ -212,22 +217,29 @@ def bake_volume(
     k) on, which to_asset, a 4 x 4 or 3 x 4 matrix, puts into the asset; with shear or uneven scale it is resampled onto cubes. density_scale: the
     attenuation coefficient, in 1 / unit of the asset, where the density is 1. albedo of single scattering: a number, three
     for linear RGB, or an array (depth, height, width, 3); without it 0.99. anisotropy: mean cosine of scattering, from
-    -0.98 to 0.98. downsampling: how levels are made, "linear", "transp", "iso", "aniso" or "matched".
+    -0.98 to 0.98, a number or an array (depth, height, width). sggx: (depth, height, width, 6), matrices S as xx, yy, zz,
+    xy, xz, yz along the asset's axes, whose sigma_t(w) is density sqrt(w^T S w); or fibre: (depth, height, width, 3),
+    directions of any length, across which the density stops, and fibre_roughness of that along them. self_shadowing:
+    (depth, height, width), in (0, 1]. docs/scene_format.md says more of these. downsampling: how levels are made, "linear", "transp", "iso", "aniso" or "matched".
     """
     values = np.ascontiguousarray(density, dtype=np.float32)
     if values.ndim != 3:
         raise ValueError(f"density: an array of shape (depth, height, width), not {values.shape}")
     per_voxel = albedo is not None and np.ndim(albedo) == 4
-    albedos = None
-    if per_voxel:
-        albedos = np.ascontiguousarray(albedo, dtype=np.float32)
-        if albedos.shape != (*values.shape, 3):
-            raise ValueError(f"albedo: an array of shape {(*values.shape, 3)}, not {albedos.shape}")
+    g_per_voxel = np.ndim(anisotropy) != 0
+    channels = {
+        "albedo": _arrays.voxels(albedo if per_voxel else None, (*values.shape, 3), "albedo"),
+        "sggx": _arrays.voxels(sggx, (*values.shape, 6), "sggx"),
+        "fibre": _arrays.voxels(fibre, (*values.shape, 3), "fibre"),
+        "anisotropy": _arrays.voxels(anisotropy if g_per_voxel else None, values.shape, "anisotropy"),
+        "self_shadowing": _arrays.voxels(self_shadowing, values.shape, "self_shadowing"),
+    }
     place = _arrays.matrix(np.eye(4) if to_asset is None else to_asset, "to_asset")
     place = place @ np.diag([voxel_size, voxel_size, voxel_size, 1.0])
     settings = _settings(coarsest_grid, source_only, threads, memory_limit)
-    settings |= _fog(density_scale, None if per_voxel else albedo, anisotropy, downsampling)
-    return _farfield.bake_volume(os.fspath(out), name, values, albedos, place, settings, progress)
+    settings |= _fog(density_scale, None if per_voxel else albedo, 0.0 if g_per_voxel else float(anisotropy),
+                     downsampling, fibre_roughness=fibre_roughness)
+    return _farfield.bake_volume(os.fspath(out), name, values, channels, place, settings, progress)
 
 
 def _settings(
@@ -252,7 +264,7 @@ def _settings(
 
 def _fog(
     density_scale: float = 1.0, albedo: Any = None, anisotropy: float = 0.0, downsampling: str = "matched",
-    density_grid: str = "", level_set: bool = False
+    density_grid: str = "", level_set: bool = False, fibre_roughness: float = 0.1
 ) -> dict[str, Any]:
     if albedo is not None:
         albedo = np.asarray(albedo, dtype=np.float64)
@@ -265,6 +277,7 @@ def _fog(
         "albedo": albedo,
         "anisotropy": anisotropy,
         "level_set": level_set,
+        "fibre_roughness": fibre_roughness,
         "downsampling": downsampling,
     }
 

@@ -112,6 +112,16 @@ def matrix(values: Any, what: str) -> Array:
     return np.ascontiguousarray(array[:3])
 
 
+def voxels(values: Any, shape: tuple[int, ...], what: str) -> Array | None:
+    """float32 rows, one per voxel, of an array of this shape; None: None."""
+    if values is None:
+        return None
+    array = np.ascontiguousarray(values, dtype=np.float32)
+    if array.shape != shape:
+        raise ValueError(f"{what}: an array of shape {shape}, not {array.shape}")
+    return array.reshape(int(np.prod(shape[:3])), -1)
+
+
 def image(values: Any, is_color: bool, what: str) -> str | Array:
     """The name of a file, or (height, width, 4) float32. Colours of 8 bits are sRGB, as in image files."""
     if isinstance(values, (str, os.PathLike)):

@@ -39,7 +39,7 @@ def bake_volume(
     folder: str,
     name: str,
     density: npt.NDArray[np.float32],
-    albedo: npt.NDArray[np.float32] | None,
+    channels: dict[str, npt.NDArray[np.float32] | None],
     to_asset: npt.NDArray[np.float64],
     settings: dict[str, Any],
     progress: Callable[[float, str], Any] | None,

@@ -71,6 +71,7 @@ static int trace_path(const Host* host, const float eye[3], const float toward[3
     CHECK(ff_interaction(host->runtime, &ray, &context, &hit) == FF_OK);
     CHECK(hit.kind == FF_SURFACE || hit.kind == FF_VOLUME);
     CHECK(hit.instance == 0 && hit.instance_data.id == 42 && hit.footprint > 0.0f && hit.diffuse[1] > 0.0f);
+    CHECK((hit.sigma_t > 0.0f) == (hit.kind == FF_VOLUME));
     ff_sample(&hit, &rng, &sample);
     CHECK(sample.pdf <= 0.0f || ff_pdf(&hit, sample.wi) > 0.0f);
     *green *= sample.weight[1];

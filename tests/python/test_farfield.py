@@ -410,6 +410,29 @@ class BakeVolume(InAFolder):
         self.assertEqual(farfield.info(self.out)["levels"][0]["voxels"],
                          farfield.info(self.folder / "same.farfield")["levels"][0]["voxels"])
 
+    def test_fibres_stop_across_themselves(self):
+        along_z = np.zeros((*self.density.shape, 3))
+        along_z[..., 2] = 1
+        g = np.full(self.density.shape, 0.25)
+        cube = np.ones((10, 10, 10))
+        shown = []
+        for axis in (0, 2):
+            fibre = np.zeros((*cube.shape, 3))
+            fibre[..., axis] = 1
+            farfield.bake_volume(cube, self.folder / f"along{axis}", albedo=0.9, density_scale=0.05, fibre=fibre,
+                                 fibre_roughness=0.05)
+            picture = farfield.render(self.folder / f"along{axis}", width=8, height=8, eye=(5, 5, 100),
+                                      target=(5, 5, 5), fov_y=0.02, level=0, samples=64, channels=("A",))
+            shown.append(float(picture.mean()))
+        self.assertLess(shown[1], 0.1)  # along the fibres
+        self.assertAlmostEqual(shown[0], 1 - np.exp(-0.5), delta=0.05)
+        report = farfield.bake_volume(self.density, self.out, albedo=0.9, fibre=along_z, anisotropy=g)
+        self.assertEqual(report["warnings"], [])
+        identity = np.zeros((*self.density.shape, 6))
+        identity[..., :3] = 1
+        report = farfield.bake_volume(self.density, self.out, albedo=0.9, sggx=identity, self_shadowing=np.ones_like(g))
+        self.assertEqual(report["warnings"], [])
+
     def test_methods_differ(self):
         z, y, x = np.mgrid[0:32, 0:32, 0:32]
         cloud = np.clip(1 + np.sin(0.9 * x + y) + np.sin(1.1 * y - z) + np.sin(0.8 * z + x), 0, None)
@@ -426,6 +449,9 @@ class BakeVolume(InAFolder):
             ("albedo: an array of shape", lambda: bake(self.density, self.out, albedo=np.zeros((1, 2, 3, 3)))),
             ("albedo: a number or three", lambda: bake(self.density, self.out, albedo=(0.1, 0.2))),
             ("downsampling is", lambda: bake(self.density, self.out, downsampling="best")),
+            ("fibre: an array of shape", lambda: bake(self.density, self.out, fibre=np.zeros((*self.density.shape, 2)))),
+            ("sggx: an array of shape", lambda: bake(self.density, self.out, sggx=np.zeros(6))),
+            ("anisotropy: an array of shape", lambda: bake(self.density, self.out, anisotropy=(0.1, 0.2))),
         ]:
             with self.subTest(message), self.assertRaisesRegex(ValueError, message):
                 call()

@@ -19,8 +19,8 @@ namespace fs = std::filesystem;
 /// A ball of fog in a box that is a little larger, in colours, turned and mirrored.
 struct Ball {
   static constexpr uint32_t kWidth = 21, kHeight = 19, kDepth = 17;
-  std::vector<float> density;
-  std::vector<vec3> albedo;
+  std::vector<float> density, anisotropy;
+  std::vector<vec3> albedo, fibre;
   glm::dmat4x3 to_asset{1.0};
 
   Ball() {
@@ -31,6 +31,8 @@ struct Ball {
           const double inside = 1 - glm::length(dvec3(voxel) - dvec3(9, 9, 8)) / 7.5;
           density.push_back(static_cast<float>(std::max(0.0, inside * (0.5 + test::smooth_noise(voxel)))));
           albedo.push_back(0.5f + 0.4f * static_cast<float>(test::smooth_noise(voxel)) * vec3(1, 0.5f, 0));
+          fibre.push_back(x % 4 == 0 ? vec3(0.0f) : vec3(y, 2, z));
+          anisotropy.push_back(0.5f - static_cast<float>(test::smooth_noise(voxel)));
         }
     const double angle = 0.7;
     to_asset[0] = 0.5 * dvec3(std::cos(angle), std::sin(angle), 0);
@@ -49,21 +51,33 @@ struct Ball {
     return volume;
   }
 
-  void write_vdb(const fs::path& path) const {
+  /// With fibres and anisotropies that vary.
+  BakeVolume fibre_volume() const {
+    BakeVolume all = volume();
+    all.fibre = fibre;
+    all.anisotropy = anisotropy;
+    return all;
+  }
+
+  void write_vdb(const fs::path& path, bool has_fibres = false) const {
     test::VdbGrid grid;
     grid.index_to_source = glm::dmat4(to_asset);
     // OpenVDB's whole numbers are centres.
     grid.index_to_source[3] = glm::dvec4(to_asset[3] + glm::dmat3(to_asset) * dvec3(0.5), 1);
-    test::VdbGrid colors = grid;
+    test::VdbGrid colors = grid, fibres = grid, cosines = grid;
     colors.name = "albedo", colors.kind = test::VdbGrid::Kind::Color;
+    fibres.name = "fibre", fibres.kind = test::VdbGrid::Kind::Color;
+    cosines.name = "anisotropy";
     for (size_t i = 0; i < density.size(); ++i) {
       if (density[i] == 0) continue;
       const int at = static_cast<int>(i), width = kWidth, height = kHeight;
       const ivec3 voxel(at % width, at / width % height, at / (width * height));
       grid.voxels.push_back({voxel, static_cast<double>(density[i]), vec3(0.0f)});
       colors.voxels.push_back({voxel, 0, albedo[i]});
+      fibres.voxels.push_back({voxel, 0, fibre[i]});
+      cosines.voxels.push_back({voxel, static_cast<double>(anisotropy[i]), vec3(0.0f)});
     }
-    test::write_vdb(path, {grid, colors});
+    test::write_vdb(path, has_fibres ? std::vector{grid, colors, fibres, cosines} : std::vector{grid, colors});
   }
 };
 
@@ -137,6 +151,63 @@ TEST(GatherVolume, BakesToTheSameBytesAsTheFile) {
   EXPECT_FALSE(bake_volume(ball.volume(), folder.path() / "arrays", settings)->is_up_to_date);
 }
 
+/// sigma_t of a voxel along the grid's axes.
+std::array<double, 3> attenuation_along_axes(const SourceVolume& volume, size_t brick, size_t voxel) {
+  std::array<double, 3> result{};
+  for (size_t axis = 0; axis < 3; ++axis)
+    result[axis] = static_cast<double>(volume.bricks[brick][voxel]) *
+                   std::sqrt(static_cast<double>(volume.shapes[brick][voxel][axis]));
+  return result;
+}
+
+TEST(GatherVolume, TakesFibresAndAnisotropiesAsTheFileHasThem) {
+  const test::TemporaryFolder folder;
+  const Ball ball;
+  ball.write_vdb(folder.path() / "ball.vdb", true);
+  BakeFog fog;
+  fog.fibre_roughness = 0.25;
+  const SourceVolume read = read_volume(folder.path() / "ball.vdb", fog_options(fog)).value();
+  const SourceVolume ours = gather_volume(ball.fibre_volume(), fog).value();
+  ASSERT_EQ(ours.warnings.size(), 1u);
+  EXPECT_NE(ours.warnings[0].find("440 voxels have no direction"), std::string::npos) << ours.warnings[0];
+  ASSERT_EQ(read.warnings.size(), 1u);
+  ASSERT_EQ(ours.shapes.size(), ours.bricks.size());
+  ASSERT_EQ(ours.brick_table.size(), read.brick_table.size());
+  for (size_t entry = 0; entry < ours.brick_table.size(); ++entry) {
+    if (ours.brick_table[entry] == kEmptyBrick) continue;
+    const size_t a = ours.brick_table[entry], b = read.brick_table[entry];
+    EXPECT_EQ(ours.anisotropies[a], read.anisotropies[b]);
+    for (size_t i = 0; i < kVolumeBrickVoxels; ++i) {
+      if (!(ours.bricks[a][i] > 0)) continue;
+      EXPECT_NEAR(ours.bricks[a][i], read.bricks[b][i], 1e-6f * read.bricks[b][i]);
+      for (size_t e = 0; e < 6; ++e) EXPECT_NEAR(ours.shapes[a][i][e], read.shapes[b][i][e], 1e-6f);
+    }
+  }
+}
+
+TEST(GatherVolume, EllipsoidsAndSelfShadowingAreKeptAlongTheAxesOfTheAsset) {
+  const std::vector<float> density = {2, 2}, self_shadowing = {0.5f, 0},
+                           sggx = {1, 4, 0.25f, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+  BakeVolume volume;
+  volume.width = 2, volume.height = volume.depth = 1;
+  volume.density = density;
+  volume.self_shadowing = self_shadowing;
+  volume.sggx = BakeRows<6>(sggx.data(), 2);
+  volume.to_asset = glm::dmat4x3(dvec3(0, 1, 0), dvec3(-1, 0, 0), dvec3(0, 0, 1), dvec3(0.0));  // the grid's x is y
+  BakeFog fog;
+  fog.albedo = glm::vec3(0.9f);
+  const SourceVolume kept = gather_volume(volume, fog).value();
+  const auto first = attenuation_along_axes(kept, 0, 0), second = attenuation_along_axes(kept, 0, 1);
+  EXPECT_NEAR(first[0], 4, 1e-6);
+  EXPECT_NEAR(first[1], 2, 1e-6);
+  EXPECT_NEAR(first[2], 1, 1e-6);
+  for (const double along : second) EXPECT_NEAR(along, 2, 1e-6);
+  EXPECT_EQ(kept.self_shadowing[0][0], 0.5f);
+  EXPECT_EQ(kept.self_shadowing[0][1], 1.0f / 255);  // the least that levels can say
+  ASSERT_EQ(kept.warnings.size(), 1u);
+  EXPECT_EQ(kept.warnings[0], "volume memory: 1 voxels have no SGGX: they stop alike from all sides");
+}
+
 TEST(GatherVolume, HasAHashOfAllThatItSays) {
   const Ball ball;
   std::vector<uint64_t> hashes;
@@ -153,6 +224,13 @@ TEST(GatherVolume, HasAHashOfAllThatItSays) {
   other = ball;
   other.to_asset[3].x += 1e-9;
   add(other, {});
+  hashes.push_back(gather_volume(ball.fibre_volume(), {}).value().source_hash);
+  other = ball;
+  other.fibre[9 + 21 * (9 + 19 * 8)].x += 1;
+  hashes.push_back(gather_volume(other.fibre_volume(), {}).value().source_hash);
+  other = ball;
+  other.anisotropy[9 + 21 * (9 + 19 * 8)] = 0;
+  hashes.push_back(gather_volume(other.fibre_volume(), {}).value().source_hash);
   BakeFog fog;
   fog.anisotropy = 0.1;
   add(ball, fog);
@@ -202,6 +280,29 @@ TEST(GatherVolume, RefusesWhatIsNoVolumeAndSaysWhere) {
   expect_refusal([](Ball&, BakeVolume& v, BakeFog&) { v.depth = 0; }, "21 x 19 x 0 voxels");
   expect_refusal([](Ball&, BakeVolume& v, BakeFog&) { v.depth = 18; }, "6783 densities for 21 x 19 x 18 voxels");
   expect_refusal([](Ball& b, BakeVolume& v, BakeFog&) { v.albedo = {&b.albedo[0].x, 7}; }, "7 albedos");
+  expect_refusal([](Ball& b, BakeVolume& v, BakeFog&) { v.fibre = {&b.fibre[0].x, 7}; }, "7 fibres for 6783 densities");
+  expect_refusal([](Ball& b, BakeVolume& v, BakeFog&) { v.sggx = {&b.fibre[0].x, 6}; }, "6 SGGX matrices");
+  expect_refusal(
+      [](Ball& b, BakeVolume& v, BakeFog&) {
+        v.sggx = {&b.fibre[0].x, 6783, 0};
+        v.fibre = b.fibre;
+      },
+      "it has sggx and fibre");
+  expect_refusal(
+      [&](Ball& b, BakeVolume& v, BakeFog&) {
+        b.fibre[at].y = NAN;
+        v.fibre = b.fibre;
+      },
+      "the fibre of voxel (3, 4, 5) has nan");
+  expect_refusal(
+      [&](Ball& b, BakeVolume& v, BakeFog&) {
+        b.anisotropy[at] = 0.99f;
+        v.anisotropy = b.anisotropy;
+      },
+      "the anisotropy of voxel (3, 4, 5) has 0.99");
+  expect_refusal([](Ball& b, BakeVolume& v, BakeFog&) { v.self_shadowing = v.anisotropy = b.anisotropy; },
+                 "it has self_shadowing and anisotropy");
+  expect_refusal([](Ball&, BakeVolume&, BakeFog& f) { f.fibre_roughness = 2; }, "fibre-roughness");
   expect_refusal([](Ball&, BakeVolume& v, BakeFog&) { v.to_asset[1] = dvec3(0.0); }, "singular");
   expect_refusal([](Ball&, BakeVolume& v, BakeFog&) { v.to_asset[3].z = NAN; }, "not finite");
   expect_refusal([](Ball&, BakeVolume&, BakeFog& f) { f.density_scale = 0; }, "density-scale");

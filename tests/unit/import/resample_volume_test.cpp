@@ -146,8 +146,27 @@ TEST(ResampleVolume, KeepsShapesAndPhaseFunctions) {
   EXPECT_NEAR(cubes.shapes[0][1][3], 0.1f, 1e-6f);
   EXPECT_NEAR(cubes.anisotropies[0][1], 0.25f, 1e-6f);
   EXPECT_NEAR(cubes.self_shadowing[0][2], 0.75f, 1e-6f);
-  volume.flakes.emplace();
-  EXPECT_FALSE(resample_to_cubes(volume, sheared_shape()));
+}
+
+TEST(ResampleVolume, FlakesAreMeansWeightedByDensity) {
+  SourceVolume volume = test::make_volume(ivec3(2, 1, 1), 1, [](const ivec3& v) { return v.x == 0 ? 1.0 : 3.0; });
+  SourceFlakes& flakes = volume.flakes.emplace();
+  flakes.diffuse.resize(1), flakes.emission.resize(1), flakes.roughness.resize(1), flakes.octants.resize(1);
+  flakes.diffuse[0][0] = vec3(1, 0.5f, 0), flakes.diffuse[0][1] = vec3(0, 0.5f, 1);
+  flakes.emission[0][1] = vec3(8.0f);
+  flakes.roughness[0][0] = 1;
+  flakes.hot_spot = 0.25f, flakes.highlight_lean = 0.125f, flakes.open_side = vec3(0, 0.1f, 0);
+  const SourceVolume cubes = resampled(volume, shape_of({1.5, 0, 0}, {0, 1, 0}, {0, 0, 1}));
+  ASSERT_TRUE(cubes.flakes);
+  ASSERT_EQ(cubes.flakes->diffuse.size(), cubes.bricks.size());
+  EXPECT_EQ(cubes.flakes->diffuse[0][0], flakes.diffuse[0][0]);
+  EXPECT_LT(glm::distance(cubes.flakes->diffuse[0][1], vec3(0.25f, 0.5f, 0.75f)), 1e-6f);  // the one between
+  EXPECT_LT(glm::distance(cubes.flakes->emission[0][1], vec3(6.0f)), 1e-5f);
+  EXPECT_NEAR(cubes.flakes->roughness[0][1], 0.25f, 1e-6f);
+  EXPECT_TRUE(cubes.flakes->specular.empty() && cubes.flakes->transmission.empty() && cubes.flakes->octants.empty());
+  EXPECT_EQ(cubes.flakes->hot_spot, 0.25f);
+  EXPECT_EQ(cubes.flakes->highlight_lean, 0.125f);
+  EXPECT_EQ(cubes.flakes->open_side, flakes.open_side);
 }
 
 TEST(ResampleVolume, DoesNotDependOnThreads) {

@@ -88,6 +88,12 @@ RuntimeOptions with_lambda(float lambda) {
   return options;
 }
 
+RuntimeOptions morphing(float lambda) {
+  RuntimeOptions options = with_lambda(lambda);
+  options.blend = Blend::Morph;
+  return options;
+}
+
 // --- Opening ---------------------------------------------------------------------------------------------------------
 
 TEST_F(RuntimeTest, CreateRefusesImpossibleOptions) {
@@ -941,6 +947,69 @@ TEST_F(RuntimeTest, InteractionsSayWhatTheirLightMeets) {
   }
 }
 
+/// Two levels of fog from 0 to 4 along each axis.
+std::vector<LevelData> fog_levels(float fine, float coarse, const std::optional<SymMat3>& shape = std::nullopt) {
+  std::vector<LevelData> levels;
+  for (uint32_t k = 0; k < 2; ++k) {
+    LevelData& level = levels.emplace_back(test::empty_level(k, k == 0 ? 0.5f : 1.0f));
+    const int side = k == 0 ? 8 : 4;
+    const auto density = [&](int x, int y, int z) {
+      return std::max({x, y, z}) < side ? (k == 0 ? fine : coarse) : 0.0f;
+    };
+    if (shape)
+      test::set_volume(level, ivec3(1), vec3(0.0f), density, [&](int, int, int) { return *shape; });
+    else
+      test::set_volume(level, ivec3(1), vec3(0.0f), density);
+    level.header.medium = Medium::Fog;
+    level.header.fog_albedo = vec3(0.5f);
+  }
+  return levels;
+}
+
+TEST_F(RuntimeTest, CollisionsInVolumesSayTheirExtinction) {
+  const SymMat3 flat = SymMat3::outer(vec3(0, 0, 1)) + SymMat3::identity() * 0.04f;
+  mat4x3 twice(2.0f);
+  mat4x3 turned(vec3(0, 0, 2), vec3(0, 2, 0), vec3(-2, 0, 0), vec3(0.0f));  // z becomes -x
+  const auto extinction = [&](const std::filesystem::path& asset, const RuntimeOptions& options, const mat4x3& place,
+                              const vec3& origin, const vec3& direction) {
+    Host host(options);
+    host.add(asset, {place});
+    host.plan();
+    RayContext context;
+    EmbreeRayHit hit;
+    EXPECT_TRUE(host.trace(origin, direction, context, hit));
+    const Interaction made = host.interaction(hit, context);
+    EXPECT_EQ(made.kind, Interaction::Kind::Volume);
+    return made.sigma_t;
+  };
+  write_asset(path_of("fog"), fog_levels(20, 60));
+  const vec3 above(2.1f, 2.2f, 20), down(0, 0, -1);
+  EXPECT_NEAR(extinction(path_of("fog"), with_lambda(0), mat4x3(1.0f), above, down), 20.0f, 1e-3f);
+  EXPECT_NEAR(extinction(path_of("fog"), with_lambda(1), mat4x3(1.0f), above, down), 60.0f, 1e-3f);
+  EXPECT_NEAR(extinction(path_of("fog"), with_lambda(0), mat4x3(1.0f), above, 7.0f * down), 20.0f, 1e-3f);
+  EXPECT_NEAR(extinction(path_of("fog"), with_lambda(0), twice, above, down), 10.0f, 1e-3f);
+  // A morph is both media, whichever was met.
+  EXPECT_NEAR(extinction(path_of("fog"), morphing(0.25f), twice, above, 3.0f * down), 0.5f * (15 + 15), 1e-3f);
+
+  write_asset(path_of("flat"), fog_levels(20, 20, flat));
+  const SymMat3 largest_1 = flat * (1 / 1.04f);  // as levels have it
+  const vec3 tilted = glm::normalize(vec3(0.6f, 0.1f, -1));
+  const auto sigma = [&](const vec3& w) { return std::sqrt(largest_1.quadratic(w)); };
+  for (const vec3& w : {down, tilted}) {
+    EXPECT_NEAR(extinction(path_of("flat"), with_lambda(0), mat4x3(1.0f), vec3(2) - 9.0f * w, w), 20 * sigma(w), 0.2f);
+  }
+  EXPECT_NEAR(extinction(path_of("flat"), with_lambda(0), turned, vec3(-4, 4, 4) - 19.0f * down, down),
+              10 * sigma({1, 0, 0}), 0.1f);
+
+  Host host(with_lambda(0));
+  host.add(sphere());
+  host.plan();
+  RayContext context;
+  EmbreeRayHit hit;
+  ASSERT_TRUE(host.trace({0, 0, 10}, down, context, hit));
+  EXPECT_EQ(host.interaction(hit, context).sigma_t, 0.0f);
+}
+
 TEST_F(RuntimeTest, ScenesThatAreInstancedAreRefusedInWords) {
   Host host;
   host.add(sphere());
@@ -1250,12 +1319,6 @@ std::vector<LevelData> swelling_sphere() {
   test::set_diffuse(levels[1], vec3(0.2f, 0.2f, 0.8f));
   test::set_diffuse(levels[2], vec3(0.2f, 0.2f, 0.8f));
   return levels;
-}
-
-RuntimeOptions morphing(float lambda) {
-  RuntimeOptions options = with_lambda(lambda);
-  options.blend = Blend::Morph;
-  return options;
 }
 
 /// Its asset.
