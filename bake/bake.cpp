@@ -228,8 +228,10 @@ class Baker {
     for (uint32_t level = 1; level <= last_level_; ++level) {
       FARFIELD_TRY(bake_level(level, std::ldexp(finest_resolution, static_cast<int>(level) - 1)));
     }
-    FARFIELD_TRY(writer_.finish());
-    FARFIELD_TRY(workspace_.publish());
+    if (!options_.surfaces_only) {
+      FARFIELD_TRY(writer_.finish());
+      FARFIELD_TRY(workspace_.publish());
+    }
     options_.job.report(1, "done");
     return std::move(report_);
   }
@@ -275,6 +277,12 @@ class Baker {
 
     FARFIELD_TRY_LET(const SurfaceOrder order, simplify_surface(level, resolution, level_report));
     if (options_.job.is_cancelled()) return cancelled();
+
+    if (options_.surfaces_only) {
+      level_report.triangles = surface_.triangles.size();
+      report_.levels.push_back(level_report);
+      return {};
+    }
 
     LevelData volume;
     if (!level_report.worthless) {
@@ -353,6 +361,10 @@ class Baker {
     compose(from_stored_.face, simplified.face_map);
     compose(from_stored_.face, order.face_number);
     level_report.simplify_seconds = simplification.seconds();
+    if (options_.see_surfaces) {
+      FARFIELD_TRY(
+          options_.see_surfaces({level, level_report.grid, resolution, parts.macrosurface, sub_resolution_, surface_}));
+    }
     return order;
   }
 
@@ -567,7 +579,8 @@ Result<BakeReport> bake_unless_up_to_date(Task task, const fs::path& out, const 
   const auto find_same = [&]() -> std::optional<Manifest> {
     auto manifest = read_manifest(out);
     const bool is_same = manifest && are_same_bake(*manifest, report.manifest) && is_whole(out, *manifest);
-    return is_same && !options.even_if_up_to_date ? std::optional(std::move(*manifest)) : std::nullopt;
+    return is_same && !options.even_if_up_to_date && !options.surfaces_only ? std::optional(std::move(*manifest))
+                                                                            : std::nullopt;
   };
   if (auto manifest = find_same()) return nothing_to_do(std::move(*manifest), watch);
   FARFIELD_TRY_LET(auto workspace, with_warnings(BakeWorkspace::open(out, options.job), report.warnings));
@@ -607,6 +620,7 @@ ImportOptions import_options(const BakeOptions& options) {
 }
 
 std::optional<Manifest> find_up_to_date(const fs::path& source, const fs::path& out, const BakeOptions& options) {
+  if (options.surfaces_only) return std::nullopt;  // whoever wants to see them has not seen them yet
   auto manifest = read_manifest(out);
   if (!manifest || !manifest->source_files) return std::nullopt;
   const auto source_hash = hash_source(source, *manifest->source_files, options.import);

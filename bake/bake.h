@@ -18,8 +18,19 @@
 #include "prefilter/downsample_fog.h"
 #include "prefilter/keep_apart.h"
 #include "prefilter/simplify.h"
+#include "prefilter/surface.h"
 
 namespace farfield {
+
+/// What a level is made of, as the bake decides it; valid during the call.
+struct LevelSurfaces {
+  uint32_t level = 0;
+  uint32_t grid = 0;
+  double resolution = 0;          ///< r_k, scene units
+  const Surface& macrosurface;    ///< what stayed surface, before simplification, and what is wrapped around walls
+  const Surface& sub_resolution;  ///< what becomes voxels: all that left the surface up to this level
+  const Surface& simplified;      ///< the macrosurface as the level has it
+};
 
 struct BakeOptions {
   uint32_t finest_grid = 512;     ///< level 1: longest side of the bounds / r_1. A power of two >= coarsest_grid
@@ -30,6 +41,12 @@ struct BakeOptions {
   bool source_only = false;                           ///< write only level 0 (what --full-detail renders)
   bool even_if_up_to_date = false;  ///< of an asset in memory: its hash does not say all that it depends on
   ImportOptions import;
+
+  /// Called by the baking thread for each level of a mesh that is made, from 1 on; its error ends the bake.
+  std::function<Result<void>(const LevelSurfaces&)> see_surfaces;
+  /// Only for see_surfaces: nothing is voxelised, of levels none but the source is weighed against their bytes, and no
+  /// asset is left in `out`.
+  bool surfaces_only = false;
 
   /// What a level costs a host. Empty: measured by loading it as the runtime would (measure_level_scene).
   std::function<Result<LevelCost>(const LevelView&)> measure_resident;

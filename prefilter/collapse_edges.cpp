@@ -155,8 +155,8 @@ class CollapsibleMesh {
 /// Collapses the edges of one mesh.
 class Simplifier {
  public:
-  Simplifier(CollapsibleMesh& mesh, double resolution, const Job& job)
-      : mesh_(mesh), resolution_(resolution), job_(job) {}
+  Simplifier(CollapsibleMesh& mesh, const EdgeCollapseOptions& options, const Job& job)
+      : mesh_(mesh), resolution_(options.resolution), placement_(options.placement), job_(job) {}
 
   void run() {
     for (uint32_t v = 0; v < mesh_.positions.size(); ++v) {
@@ -328,17 +328,29 @@ class Simplifier {
     const auto optimum = [&] { return place_vertex(ring_, 0.5 * (pa + pb), tolerance).position; };
     if (kind_a_ == VertexKind::Interior && kind_b_ == VertexKind::Interior) {
       const dvec3 x = optimum();
-      return accept(keep_vertex(ring_, restore_area(ring_, x, with_same_volume(ring_, x))));
+      return accept(keep_vertex(ring_, chosen_between(x, with_same_volume(ring_, x))));
     }
     if (kind_a_ == VertexKind::Curve && kind_b_ == VertexKind::Curve) {
       const dvec3 x = optimum();
       const dvec3 p = mesh_.positions[curve_neighbour(spokes_a_, b)],
                   q = mesh_.positions[curve_neighbour(spokes_b_, a)];
       const auto limit = with_same_border_area(p, pa, pb, q, x);
-      return limit ? accept(keep_vertex(ring_, restore_area(ring_, x, *limit))) : std::nullopt;
+      return limit ? accept(keep_vertex(ring_, chosen_between(x, *limit))) : std::nullopt;
     }
     const bool stays_at_a = kind_b_ == VertexKind::Interior || kind_a_ == VertexKind::Corner;
     return accept(keep_vertex(ring_, stays_at_a ? pa : pb));
+  }
+
+  dvec3 chosen_between(const dvec3& closest, const dvec3& same_volume) const {
+    switch (placement_) {
+      case VertexPlacement::EqualArea:
+        return restore_area(ring_, closest, same_volume);
+      case VertexPlacement::EqualVolume:
+        return same_volume;
+      case VertexPlacement::ClosestPoints:
+        return closest;
+    }
+    return closest;
   }
 
   /// The other end of the feature edge at a curve vertex that does not lead to `excluded`.
@@ -396,6 +408,7 @@ class Simplifier {
 
   CollapsibleMesh& mesh_;
   const double resolution_;
+  const VertexPlacement placement_;
   const Job& job_;
   std::priority_queue<Candidate> queue_;
 
@@ -460,7 +473,7 @@ SimplifyResult collapse_edges(const Surface& surface, const EdgeCollapseOptions&
       for (size_t part = begin; part < end && !job.is_cancelled(); ++part) {
         if (is_all_fixed(options, parts, part)) continue;
         CollapsibleMesh mesh = extract_part(surface, options, parts, part);
-        Simplifier(mesh, options.resolution, job).run();
+        Simplifier(mesh, options, job).run();
         store_part(mesh, parts, part, working);
       }
     });

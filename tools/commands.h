@@ -18,6 +18,7 @@ using Action = std::function<Result<void>()>;
 /// Each adds its command to `app`; when the command is the one on the command line, `action` is set.
 void add_bake_command(CLI::App& app, Action& action);
 void add_info_command(CLI::App& app, Action& action);
+void add_analyse_command(CLI::App& app, Action& action);
 void add_verify_command(CLI::App& app, Action& action);
 void add_evaluate_command(CLI::App& app, Action& action);
 void add_export_command(CLI::App& app, Action& action);

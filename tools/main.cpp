@@ -71,6 +71,7 @@ int run(int argc, char** argv) {
   tool::Action action;
   tool::add_bake_command(app, action);
   tool::add_info_command(app, action);
+  tool::add_analyse_command(app, action);
   tool::add_verify_command(app, action);
   tool::add_evaluate_command(app, action);
   tool::add_export_command(app, action);

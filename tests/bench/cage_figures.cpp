@@ -18,14 +18,12 @@
 #include <unordered_map>
 
 #include "base/hash.h"
+#include "evaluate/triangle_distance.h"
 #include "import/read_source.h"
 #include "prefilter/subdivide.h"
-#include "tests/support/triangle_distance.h"
 
 namespace farfield {
 namespace {
-
-using test::distance_to_triangle;
 
 struct Tessellation {
   SourceMesh mesh;

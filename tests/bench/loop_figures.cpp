@@ -9,49 +9,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstdlib>
 
 #include "bake/pack_level.h"
 #include "base/index.h"
 #include "base/process_time.h"
-#include "base/random.h"
+#include "evaluate/surface_distance.h"
 #include "prefilter/quad_part.h"
 #include "prefilter/simplify.h"
 #include "tests/support/imported_surface.h"
-#include "tests/support/nearest_point.h"
 #include "tests/support/surfaces.h"
 
 namespace farfield {
 namespace {
 
 constexpr int kSamples = 20000;
-
-/// Farthest and root mean square of the distances from points on one surface to the other.
-std::array<double, 2> distances(const Surface& from, const Surface& to) {
-  std::vector<double> area_below;
-  double area = 0;
-  for (const uvec3& t : from.triangles) {
-    const dvec3 a(from.positions[t.x]), b(from.positions[t.y]), c(from.positions[t.z]);
-    area_below.push_back(area += glm::length(glm::cross(b - a, c - a)));
-  }
-  const test::NearestPoint nearest(to);
-  Rng rng(5);
-  double farthest = 0, sum2 = 0;
-  for (int i = 0; i < kSamples; ++i) {
-    const auto found = std::upper_bound(area_below.begin(), area_below.end(), rng.next() * area);
-    const auto f = std::min<size_t>(static_cast<size_t>(found - area_below.begin()), area_below.size() - 1);
-    const float root = std::sqrt(rng.next()), v = rng.next();
-    const uvec3& t = from.triangles[f];
-    const vec3 p =
-        (1 - root) * from.positions[t.x] + root * (1 - v) * from.positions[t.y] + root * v * from.positions[t.z];
-    const double d = nearest.distance(p);
-    farthest = std::max(farthest, d);
-    sum2 += d * d;
-  }
-  return {farthest, std::sqrt(sum2 / kSamples)};
-}
 
 size_t count_quads(const Surface& surface) {
   const std::vector<uint32_t> other = find_other_halves(surface.quad);
@@ -67,10 +39,10 @@ void print_cascade(const Surface& source, SimplifyMethod method, int finest, int
     const size_t faces = surface.triangles.size();
     surface = simplify(surface, {static_cast<float>(r), method}).surface;
     const double seconds = process_cpu_seconds() - before;
-    const auto there = distances(source, surface), back = distances(surface, source);
+    const SurfaceDistance distance = two_sided_distance(source, surface, kSamples);
     fmt::print("| {} | {}^3 | {} | {} | {} | {:.3f} | {:.4f} | {:+.2f} % | {:.1f} |\n", name_of(method), grid,
                surface.triangles.size(), count_quads(surface), order_surface(surface).quads.size(),
-               std::max(there[0], back[0]) / r, std::max(there[1], back[1]) / r,
+               distance.farthest / r, distance.rms / r,
                100 * (test::total_area(surface) / test::total_area(source) - 1),
                1e6 * seconds / static_cast<double>(faces));
   }

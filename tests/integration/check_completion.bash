@@ -17,7 +17,7 @@ offers() {
 }
 
 offers "bake" ba
-offers "bake info verify evaluate export render shot trade why sky" ""
+offers "bake info analyse verify evaluate export render shot trade why sky" ""
 offers "--version" --ver
 offers "--budget" render --bud
 offers "--no-sky" render scene.glb -o out.exr --no

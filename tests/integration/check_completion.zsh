@@ -22,7 +22,7 @@ offers() {
   done
 }
 
-offers "bake info verify evaluate export render shot trade why sky" ""
+offers "bake info analyse verify evaluate export render shot trade why sky" ""
 offers "--help --version" --ver
 offers "-o --output --budget --no-sky" render --bud
 offers "-o --finest-grid" bake -o

@@ -81,7 +81,7 @@ void expect_quiet_success(const ProcessOutput& output) {
 }
 
 const std::vector<std::string> kCommands = {"bake",   "info", "verify", "evaluate", "export",
-                                            "render", "shot", "trade",  "sky"};
+                                            "render", "shot", "trade",  "sky",      "analyse"};
 
 TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
   const std::vector<std::vector<std::string>> flags = {
@@ -95,7 +95,8 @@ TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
       {"--frames", "--size", "--spp", "--budget", "--assets", "--blend", "--pixel-error", "--full-detail", "--output"},
       {"--frames", "--size", "--spp", "--budget", "--assets", "--pixel-error", "--rays-per-voxel", "--finest-grid",
        "--no-turned-sun", "--output"},
-      {"--output", "--width"}};
+      {"--output", "--width"},
+      {"--output", "--json", "--compare", "--finest-grid", "--subdivide", "--view", "--size"}};
   for (size_t i = 0; i < kCommands.size(); ++i) {
     const ProcessOutput help = farfield({kCommands[i], "--help"});
     EXPECT_EQ(help.exit_code, 0) << kCommands[i];
@@ -133,6 +134,9 @@ TEST(Usage, NonsenseIsOneLineThatPointsToTheHelp) {
       {"info"},
       {"info", "a", "b"},
       {"verify"},
+      {"analyse"},
+      {"analyse", "a.obj", "--view", "12"},
+      {"analyse", "a.obj", "--size", "8"},
       {"evaluate", "a"},
       {"evaluate", "a", "--source", "b", "--levels", "5-2"},
       {"evaluate", "a", "--source", "b", "--views", "0"},
@@ -208,6 +212,8 @@ class BadInput : public testing::Test {
 
 TEST_F(BadInput, MissingFilesAreNamed) {
   expect_one_line_error(farfield({"bake", path("no.obj"), "-o", path("out.farfield")}), path("no.obj"));
+  expect_one_line_error(farfield({"analyse", path("no.obj"), "-o", path("no.png")}), path("no.obj"));
+  EXPECT_FALSE(fs::exists(path("no.png")));
   expect_one_line_error(farfield({"info", path("no.farfield")}), path("no.farfield"));
   expect_one_line_error(farfield({"verify", path("no.farfield")}), path("no.farfield"));
   expect_one_line_error(farfield({"evaluate", path("no.farfield"), "--source", bush}), path("no.farfield"));
@@ -257,6 +263,8 @@ TEST_F(BadInput, UnwritableOutputIsNamedBeforeAnyWorkIsDone) {
   expect_one_line_error(farfield({"bake", bush, "-o", bush}), "bush.obj");
   expect_one_line_error(farfield({"bake", bush, "-o", "/proc/nothing/out.farfield"}), "/proc/nothing");
   expect_one_line_error(farfield({"evaluate", path("a"), "--source", bush, "--sheet", path("no/a.png")}), "no/a.png");
+  expect_one_line_error(farfield({"analyse", bush, "-o", path("no/a.png")}), "no/a.png");
+  expect_one_line_error(farfield({"analyse", bush, "-o", path("a.exr")}), "a.exr");
   expect_one_line_error(farfield({"render", path("a.glb"), "-o", path("no/a.exr")}), "no/a.exr");
   expect_one_line_error(farfield({"render", path("a.glb"), "-o", "/dev/null"}), "/dev/null");
   expect_one_line_error(farfield({"trade", bush, "--frames", "0", "-o", "/proc/nothing/trade"}), "/proc/nothing");
@@ -876,6 +884,20 @@ TEST(Warnings, OfAMeshThatCannotBeBakedAreSaidByRenderAndShot) {
     expect_warning_before_error(output, "bake", "extension EXT_of_nobody is not read", error);
     expect_warning_before_error(output, command, "extension EXT_of_nobody is not read", error);
   }
+}
+
+TEST(Analyse, WritesItsFilesAndElsePrintsATable) {
+  const fs::path folder = fresh_folder("analyse");
+  const std::string bush = (folder / "bush.obj").string(), sheet = (folder / "a.png").string(),
+                    json = (folder / "a.json").string();
+  test::write_bush_obj(bush, 20);
+  const ProcessOutput files = farfield({"analyse", bush, "-o", sheet, "--json", json, "--finest-grid", "16"});
+  EXPECT_EQ(files.exit_code, 0) << files.err;
+  EXPECT_EQ(files.out, "");
+  EXPECT_TRUE(fs::exists(sheet) && fs::exists(json));
+  const ProcessOutput table = farfield({"analyse", bush, "--finest-grid", "16"});
+  EXPECT_EQ(table.exit_code, 0);
+  EXPECT_NE(table.out.find("16^3"), std::string::npos) << table.out << table.err;
 }
 
 TEST_F(WholeRoad, TheSkyIsAPictureThatLightsASceneAlike) {

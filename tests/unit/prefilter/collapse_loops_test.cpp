@@ -9,7 +9,7 @@
 
 #include "base/index.h"
 #include "base/parallel.h"
-#include "tests/support/nearest_point.h"
+#include "evaluate/nearest_point_grid.h"
 #include "tests/support/simplified_surface.h"
 #include "tests/support/surfaces.h"
 
@@ -49,7 +49,7 @@ size_t count_halves(const Surface& surface) {
 double two_sided_distance(const Surface& a, const Surface& b) {
   double farthest = 0;
   for (const auto& [from, to] : {std::pair(&a, &b), std::pair(&b, &a)}) {
-    const NearestPoint nearest(*to);
+    const NearestPointGrid nearest(*to);
     for (const uvec3& t : from->triangles) {
       const vec3 &p = from->positions[t.x], &q = from->positions[t.y], &r = from->positions[t.z];
       for (const vec3& point : {p, q, r, 0.5f * (p + q), (p + q + r) / 3.0f}) {

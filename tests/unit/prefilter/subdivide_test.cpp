@@ -13,8 +13,8 @@
 #include <set>
 
 #include "base/parallel.h"
+#include "evaluate/triangle_distance.h"
 #include "tests/support/cages.h"
-#include "tests/support/triangle_distance.h"
 
 namespace farfield {
 namespace {

@@ -7,15 +7,15 @@
 #include <limits>
 #include <vector>
 
+#include "evaluate/triangle_distance.h"
 #include "prefilter/surface.h"
-#include "tests/support/triangle_distance.h"
 
-namespace farfield::test {
+namespace farfield {
 
 /// Triangles must have area.
-class NearestPoint {
+class NearestPointGrid {
  public:
-  explicit NearestPoint(const Surface& surface) : surface_(surface), box_(surface.bounds()) {
+  explicit NearestPointGrid(const Surface& surface) : surface_(surface), box_(surface.bounds()) {
     const dvec3 size(box_.size());
     const double longest = std::max({size.x, size.y, size.z});
     cell_ = longest / std::clamp(std::sqrt(static_cast<double>(surface.triangles.size()) / 6), 1.0, 128.0);
@@ -78,4 +78,4 @@ class NearestPoint {
   std::vector<std::vector<uint32_t>> cells_;
 };
 
-}  // namespace farfield::test
+}  // namespace farfield

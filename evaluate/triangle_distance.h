@@ -6,7 +6,7 @@
 
 #include "base/vec.h"
 
-namespace farfield::test {
+namespace farfield {
 
 /// From a point to the nearest point of the triangle a b c, which has area.
 inline double distance_to_triangle(const dvec3& p, const dvec3& a, const dvec3& b, const dvec3& c) {
@@ -23,4 +23,4 @@ inline double distance_to_triangle(const dvec3& p, const dvec3& a, const dvec3& 
   return std::min({to_edge(a, b), to_edge(b, c), to_edge(c, a)});
 }
 
-}  // namespace farfield::test
+}  // namespace farfield
