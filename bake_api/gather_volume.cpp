@@ -137,7 +137,9 @@ class VolumeGatherer {
                              double most) const {
     for (int c = 0; c < N && !rows.empty(); ++c) {
       const double value = rows.at(index, c);
-      if (!(value >= least && value <= most))
+      // As a float, so that a float of 0.98 is not above it.
+      if (!(static_cast<float>(value) >= static_cast<float>(least) &&
+            static_cast<float>(value) <= static_cast<float>(most)))
         return error("the {} of voxel ({}, {}, {}) has {}, not from {} to {}", what, voxel.x, voxel.y, voxel.z, value,
                      least, most);
     }

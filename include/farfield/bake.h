@@ -200,8 +200,8 @@ struct BakeVolume {
   /// (BakeFog::fibre_roughness). 0: alike from all sides. One of these two at most.
   BakeRows<3> fibre;
   BakeRows<1> anisotropy;      ///< g of each voxel, from -0.98 to 0.98. None: BakeFog::anisotropy
-  BakeRows<1> self_shadowing;  ///< share, in (0, 1], of scattered light that leaves a voxel at once; without
-                               ///< `anisotropy` alone. None: 1
+  BakeRows<1> self_shadowing;  ///< share, in [0, 1] (below 1/255 it is that), of scattered light that leaves a voxel
+                               ///< at once; not together with `anisotropy`. None: 1
   /// Voxel (i, j, k) is where this puts the cube [i, i + 1] x [j, j + 1] x [k, k + 1]: any affine map. Where
   /// that is no cube, the fog is resampled onto cubes of the shortest edge, and a warning says so.
   glm::dmat4x3 to_asset{1.0};

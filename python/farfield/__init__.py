@@ -220,7 +220,7 @@ def bake_volume(
     -0.98 to 0.98, a number or an array (depth, height, width). sggx: (depth, height, width, 6), matrices S as xx, yy, zz,
     xy, xz, yz along the asset's axes, whose sigma_t(w) is density sqrt(w^T S w); or fibre: (depth, height, width, 3),
     directions of any length, across which the density stops, and fibre_roughness of that along them. self_shadowing:
-    (depth, height, width), in (0, 1]. docs/scene_format.md says more of these. downsampling: how levels are made, "linear", "transp", "iso", "aniso" or "matched".
+    (depth, height, width), in [0, 1]. docs/scene_format.md says more of these. downsampling: how levels are made, "linear", "transp", "iso", "aniso" or "matched".
     """
     values = np.ascontiguousarray(density, dtype=np.float32)
     if values.ndim != 3:

@@ -185,6 +185,13 @@ TEST(GatherVolume, TakesFibresAndAnisotropiesAsTheFileHasThem) {
   }
 }
 
+TEST(GatherVolume, TakesTheMostAnisotropyAsAFloat) {
+  Ball ball;
+  ball.anisotropy.assign(ball.anisotropy.size(), 0.98f);
+  ball.anisotropy[0] = -0.98f;
+  EXPECT_TRUE(gather_volume(ball.fibre_volume(), {}));
+}
+
 TEST(GatherVolume, EllipsoidsAndSelfShadowingAreKeptAlongTheAxesOfTheAsset) {
   const std::vector<float> density = {2, 2}, self_shadowing = {0.5f, 0},
                            sggx = {1, 4, 0.25f, 0, 0, 0, 0, 0, 0, 0, 0, 0};
