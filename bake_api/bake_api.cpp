@@ -54,6 +54,15 @@ static_assert(static_cast<int>(BakeSubdivision::Scheme::Loop) == static_cast<int
 static_assert(static_cast<int>(BakeSubdivision::Boundary::EdgeOnly) == static_cast<int>(CageBoundary::EdgeOnly));
 static_assert(static_cast<int>(BakeSubdivision::Uv::All) == static_cast<int>(CageUv::All));
 
+/// The same of methods.
+Result<SimplifyMethod> simplify_method(BakeSimplify method) {
+  if (method > BakeSimplify::Edges)
+    return make_error(ErrorCode::InvalidArgument, "bake: a way to simplify that does not exist");
+  return static_cast<SimplifyMethod>(method);
+}
+static_assert(static_cast<int>(BakeSimplify::Loops) == static_cast<int>(SimplifyMethod::Loops));
+static_assert(static_cast<int>(BakeSimplify::Edges) == static_cast<int>(SimplifyMethod::Edges));
+
 BakeOptions bake_options(const BakeSettings& settings, const MemoryGuard& guard) {
   BakeOptions options;
   options.finest_grid = settings.finest_grid;
@@ -99,11 +108,13 @@ Result<BakeSummary> run_limited(const BakeSettings& settings, const Run& run) {
     return make_error(ErrorCode::InvalidArgument, fmt::format("bake: {} threads", settings.threads));
   }
   FARFIELD_TRY_LET(const auto subdivision, subdivision_options(settings.subdivision));
+  FARFIELD_TRY_LET(const auto simplify, simplify_method(settings.simplify));
   const ThreadLimit threads(settings.threads);
   const MemoryGuard guard(settings.memory_limit_bytes, settings.cancel);
   try {
     BakeOptions options = bake_options(settings, guard);
     options.import.subdivision = subdivision;
+    options.simplify = simplify;
     const Result<BakeReport> report = run(std::move(options));
     if (report) return summary_of(*report);
     if (report.error().code == ErrorCode::Cancelled && guard.exceeded_bytes() > 0) {

@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
-#include <queue>
 #include <span>
 
 #include "base/index.h"
 #include "base/parallel.h"
 #include "prefilter/collapse_limits.h"
 #include "prefilter/edge_table.h"
+#include "prefilter/length_queue.h"
 #include "prefilter/material_filter.h"
 #include "prefilter/surface_parts.h"
 #include "prefilter/vertex_placement.h"
@@ -156,7 +156,11 @@ class CollapsibleMesh {
 class Simplifier {
  public:
   Simplifier(CollapsibleMesh& mesh, const EdgeCollapseOptions& options, const Job& job)
-      : mesh_(mesh), resolution_(options.resolution), placement_(options.placement), job_(job) {}
+      : mesh_(mesh),
+        resolution_(options.resolution),
+        placement_(options.placement),
+        job_(job),
+        queue_(kShortEdge * kShortEdge * resolution_ * resolution_, 3 * mesh.triangles.size() / 2) {}
 
   void run() {
     for (uint32_t v = 0; v < mesh_.positions.size(); ++v) {
@@ -165,18 +169,17 @@ class Simplifier {
         if (v < spoke.vertex) push(v, spoke.vertex);
       }
     }
-    while (!queue_.empty() && !job_.is_cancelled()) {
-      const Candidate candidate = queue_.top();
-      queue_.pop();
+    Candidate candidate;
+    while (!job_.is_cancelled() && queue_.pop(candidate)) {
       if (is_current(candidate) && try_collapse(candidate.a, candidate.b)) push_edges_at(candidate.a);
     }
   }
 
  private:
   struct Candidate {
-    double length2;
-    uint32_t a, b;  ///< a < b
-    uint32_t version_a, version_b;
+    double length2 = 0;
+    uint32_t a = 0, b = 0;  ///< a < b
+    uint32_t version_a = 0, version_b = 0;
 
     /// For a queue whose top is the shortest edge; equally long ones in the order of their vertices.
     friend bool operator<(const Candidate& l, const Candidate& r) {
@@ -325,7 +328,7 @@ class Simplifier {
     const auto accept = [&](const Placement& placement) -> std::optional<Placement> {
       return is_valid(a, b, placement) ? std::optional(placement) : std::nullopt;
     };
-    const auto optimum = [&] { return place_vertex(ring_, 0.5 * (pa + pb), tolerance).position; };
+    const auto optimum = [&] { return closest_position(ring_, 0.5 * (pa + pb), tolerance); };
     if (kind_a_ == VertexKind::Interior && kind_b_ == VertexKind::Interior) {
       const dvec3 x = optimum();
       return accept(keep_vertex(ring_, chosen_between(x, with_same_volume(ring_, x))));
@@ -410,7 +413,7 @@ class Simplifier {
   const double resolution_;
   const VertexPlacement placement_;
   const Job& job_;
-  std::priority_queue<Candidate> queue_;
+  LengthQueue<Candidate> queue_;
 
   // About the edge at hand; members so that their memory is reused.
   std::vector<uint32_t> kept_, collapsing_, common_;

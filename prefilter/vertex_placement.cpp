@@ -97,18 +97,16 @@ void CollapseRing::clear() {
   neighbours_after.clear();
 }
 
-Placement place_vertex(const CollapseRing& ring, const dvec3& start, double tolerance) {
+dvec3 closest_position(const CollapseRing& ring, const dvec3& start, double tolerance) {
   dvec3 x = start;
-  LeastSquares sums = pair_closest_points(ring, x);
   for (int i = 0; i < kMaxIterations; ++i) {
-    const std::optional<dvec3> solution = sums.solution();
+    const std::optional<dvec3> solution = pair_closest_points(ring, x).solution();
     if (!solution) break;
     const bool has_converged = squared(*solution - x) < tolerance * tolerance;
     x = *solution;
-    sums = pair_closest_points(ring, x);
     if (has_converged) break;
   }
-  return {x, std::sqrt(sums.max_distance2)};
+  return x;
 }
 
 Placement keep_vertex(const CollapseRing& ring, const dvec3& position) {

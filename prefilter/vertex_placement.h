@@ -25,11 +25,11 @@ struct Placement {
   double deviation;  ///< largest distance from a sample of one surface to the other
 };
 
-/// Moves x from `start` so that the sum of squared distances between samples of each surface and the other surface
-/// falls, until it moves by less than `tolerance` [Loubet 2018, eq. 8.2.2]. The sum never grows. Pure function.
-Placement place_vertex(const CollapseRing& ring, const dvec3& start, double tolerance);
+/// Where x goes from `start` so that the sum of squared distances between samples of each surface and the other
+/// surface falls, until it moves by less than `tolerance` [Loubet 2018, eq. 8.2.2]. The sum never grows. Pure function.
+dvec3 closest_position(const CollapseRing& ring, const dvec3& start, double tolerance);
 
-/// The same measure for an x that is given.
+/// How far the surfaces are from each other with this x. Pure function.
 Placement keep_vertex(const CollapseRing& ring, const dvec3& position);
 
 /// The point between `from` and `to` where the area after the collapse is nearest to the area before. The optimum above

@@ -106,6 +106,7 @@ BakeSettings to_settings(const py::dict& fields, LongCall& call, bool has_progre
   settings.rays_per_voxel = fields["rays_per_voxel"].cast<uint32_t>();
   settings.source_only = fields["source_only"].cast<bool>();
   settings.subdivision = to_subdivision(fields);
+  settings.simplify = static_cast<BakeSimplify>(fields["simplify"].cast<uint8_t>());
   settings.threads = fields["threads"].cast<int>();
   settings.memory_limit_bytes = fields["memory_limit_bytes"].cast<uint64_t>();
   settings.fog = to_fog(fields);

@@ -220,13 +220,18 @@ struct BakeFog {
 /// How levels of a volume are made (docs/decisions/0026).
 enum class BakeDownsampling : uint8_t { Linear, Transp, Iso, Aniso, Matched };
 
+/// What collapses on coarser levels of meshes (docs/decisions/0034): face loops in connected parts of well-structured
+/// quads and edges elsewhere; loops wherever there are quads; edges alone.
+enum class BakeSimplify : uint8_t { Auto, Loops, Edges };
+
 struct BakeSettings {
   uint32_t finest_grid = 512;     ///< voxels along the longest side of level 1: a power of two, up to 4096
   uint32_t coarsest_grid = 8;     ///< the same of the last level, the root; <= finest_grid
   uint32_t rays_per_voxel = 200;  ///< that measure each voxel's occlusion, >= 1
   bool source_only = false;       ///< level 0 only: the source, ready to render
   BakeSubdivision subdivision;    ///< of all meshes
-  BakeFog fog;                    ///< of volumes alone; their grids are their own: finest_grid is not looked at
+  BakeSimplify simplify = BakeSimplify::Auto;
+  BakeFog fog;  ///< of volumes alone; their grids are their own: finest_grid is not looked at
   BakeDownsampling downsampling = BakeDownsampling::Matched;
   int threads = 0;                  ///< 0: as many as the machine has
   uint64_t memory_limit_bytes = 0;  ///< what the process may grow by meanwhile, as `ps` shows it; 0: no limit

@@ -116,6 +116,7 @@ def bake(
     subdivide_edge: float = 0,
     subdivide_boundary: str = "edge-and-corner",
     subdivide_uv: str = "corners-plus1",
+    simplify: str = "auto",
     threads: int = 0,
     memory_limit: int = 0,
     progress: Progress | None = None,
@@ -139,6 +140,9 @@ def bake(
     subdivide_uv: where texture coordinates stay linear: "none", "corners-only", "corners-plus1", "corners-plus2",
     "boundaries", "all".
 
+    simplify: what collapses on coarser levels: "loops" (of quads, which stay quads; edges of other faces), "edges" (of all
+    faces), "auto" (loops of well-structured parts, edges of the others).
+
     memory_limit: bytes that the process may grow by; 0 is no limit. progress: called with (done in [0, 1], stage); what
     it raises ends the bake. Ctrl-C ends it too; the next call goes on from there.
     """
@@ -151,6 +155,7 @@ def bake(
             raise ValueError(f"mesh {i}{f' ({mesh.name})' if mesh.name else ''}: {unfit}") from None
     settings = _settings(coarsest_grid, source_only, threads, memory_limit, finest_grid, rays_per_voxel)
     settings |= _subdivision(subdivide, subdivide_error, subdivide_edge, subdivide_boundary, subdivide_uv)
+    settings |= _simplify(simplify)
     placed = _arrays.instances(instances, len(all_meshes))
     looks = _arrays.materials(materials)
     return _farfield.bake_meshes(os.fspath(out), name, arrays, placed, looks, material_key, settings, progress)
@@ -177,6 +182,7 @@ def bake_file(
     subdivide_edge: float = 0,
     subdivide_boundary: str = "edge-and-corner",
     subdivide_uv: str = "corners-plus1",
+    simplify: str = "auto",
     threads: int = 0,
     memory_limit: int = 0,
     progress: Progress | None = None,
@@ -187,6 +193,7 @@ def bake_file(
     settings = _settings(coarsest_grid, source_only, threads, memory_limit, finest_grid, rays_per_voxel)
     settings |= _fog(density_scale, albedo, anisotropy, downsampling, density_grid, level_set, fibre_roughness)
     settings |= _subdivision(subdivide, subdivide_error, subdivide_edge, subdivide_boundary, subdivide_uv)
+    settings |= _simplify(simplify)
     return _farfield.bake_file(os.fspath(source), os.fspath(out), mesh, settings, progress)
 
 
@@ -259,6 +266,7 @@ def _settings(
         "memory_limit_bytes": memory_limit,
         **_fog(),
         **_subdivision(),
+        **_simplify(),
     }
 
 
@@ -285,21 +293,27 @@ def _fog(
 _SCHEMES = ("none", "catmull-clark", "loop")
 _BOUNDARIES = ("edge-and-corner", "edge-only")
 _UV_RULES = ("none", "corners-only", "corners-plus1", "corners-plus2", "boundaries", "all")
+_SIMPLIFY = ("auto", "loops", "edges")
+
+
+def _number(name: str, value: str, names: tuple[str, ...]) -> int:
+    if value not in names:
+        raise ValueError(f"{name} is {value!r}, which is none of {', '.join(names)}")
+    return names.index(value)
+
+
+def _simplify(method: str = "auto") -> dict[str, Any]:
+    return {"simplify": _number("simplify", method, _SIMPLIFY)}
 
 
 def _subdivision(
     scheme: str = "none", error: float = 0.125, edge: float = 0, boundary: str = "edge-and-corner",
     uv: str = "corners-plus1"
 ) -> dict[str, Any]:
-    def number(name: str, value: str, names: tuple[str, ...]) -> int:
-        if value not in names:
-            raise ValueError(f"{name} is {value!r}, which is none of {', '.join(names)}")
-        return names.index(value)
-
     return {
-        "subdivide": number("subdivide", scheme, _SCHEMES),
-        "subdivide_boundary": number("subdivide_boundary", boundary, _BOUNDARIES),
-        "subdivide_uv": number("subdivide_uv", uv, _UV_RULES),
+        "subdivide": _number("subdivide", scheme, _SCHEMES),
+        "subdivide_boundary": _number("subdivide_boundary", boundary, _BOUNDARIES),
+        "subdivide_uv": _number("subdivide_uv", uv, _UV_RULES),
         "subdivide_error": error,
         "subdivide_edge": edge,
     }

@@ -53,6 +53,15 @@ class Bake(InAFolder):
         self.assertEqual(report["warnings"], [])
         self.assertTrue(farfield.bake(farfield.Mesh(self.points, self.quads), self.out, **SMALL)["up_to_date"])
 
+    def test_simplifies_as_it_is_told(self):
+        options = SMALL | {"finest_grid": 32, "coarsest_grid": 16}
+        for method in ("loops", "edges"):
+            farfield.bake(farfield.Mesh(self.points, self.quads), self.out, simplify=method, **options)
+            manifest = (Path(self.out) / "manifest.json").read_text()
+            self.assertIn(f"simplify={method}", manifest)
+        with self.assertRaisesRegex(ValueError, "simplify is 'quads'"):
+            farfield.bake(farfield.Mesh(self.points, self.quads), self.out, simplify="quads", **options)
+
     def test_makes_cages_smooth(self):
         corners = np.array([[x, y, z] for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)], dtype=float)
         faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]

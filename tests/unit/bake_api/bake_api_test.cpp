@@ -9,6 +9,7 @@
 
 #include "bake_api/gather_mesh.h"
 #include "bake_api/source_from_input.h"
+#include "cache/manifest.h"
 #include "farfield/bake.h"
 #include "prefilter/condition.h"
 #include "tests/support/files.h"
@@ -349,6 +350,30 @@ TEST(BakeApiCage, IsBakedSmooth) {
   ASSERT_TRUE(coarse) << coarse.error().message;
   EXPECT_FALSE(coarse->is_up_to_date);
   EXPECT_LT(coarse->levels[0].triangles, creased->levels[0].triangles);
+}
+
+TEST(BakeApiCage, IsSimplifiedAsTheSettingsSay) {
+  const Cube cube;
+  const test::TemporaryFolder folder;
+  const std::string out = (folder.path() / "cube.farfield").string();
+  BakeSettings settings;
+  settings.finest_grid = 32;
+  settings.coarsest_grid = 16;
+  settings.rays_per_voxel = 2;
+  settings.subdivision.scheme = BakeSubdivision::Scheme::CatmullClark;
+  settings.subdivision.edge = 1;
+  settings.simplify = BakeSimplify::Loops;
+  const auto loops = bake_meshes(cube.input(false), out, settings);
+  ASSERT_TRUE(loops) << loops.error().message;
+  EXPECT_NE(read_manifest(out)->options.find("simplify=loops"), std::string::npos);
+  settings.simplify = BakeSimplify::Edges;
+  const auto edges = bake_meshes(cube.input(false), out, settings);
+  ASSERT_TRUE(edges) << edges.error().message;
+  EXPECT_FALSE(edges->is_up_to_date);
+  EXPECT_NE(loops->levels.back().triangles, edges->levels.back().triangles);
+  EXPECT_EQ(loops->levels.back().triangles % 2, 0u) << "quads stay quads";
+  settings.simplify = static_cast<BakeSimplify>(3);
+  EXPECT_EQ(code_of(bake_meshes(cube.input(false), out, settings)), ErrorCode::InvalidArgument);
 }
 
 TEST(BakeApiCage, RefusesSubdivisionsThatMakeNoSense) {

@@ -76,7 +76,7 @@ TEST(VertexPlacement, ClosestPointIsNoFartherThanAnyPointOfTheTriangle) {
 
 TEST(VertexPlacement, OnAPlaneTheOptimumIsInThePlane) {
   const CollapseRing ring = grid_ring([](double x, double y) { return 2 * x - y; });
-  const Placement placement = place_vertex(ring, {0.3, 0.2, 1.5}, 1e-9);
+  const Placement placement = keep_vertex(ring, closest_position(ring, {0.3, 0.2, 1.5}, 1e-9));
   EXPECT_NEAR(placement.position.z, 2 * placement.position.x - placement.position.y, 1e-6);
   EXPECT_LT(placement.deviation, 1e-6);
 }
@@ -87,7 +87,7 @@ TEST(VertexPlacement, TheOptimumIsNotFartherFromTheSurfaceThanTheStart) {
     std::normal_distribution<double> normal(0.0, 0.3);
     const CollapseRing ring = grid_ring([&](double, double) { return normal(rng); });
     const dvec3 start(0.5, 0.0, normal(rng));
-    const Placement placement = place_vertex(ring, start, 1e-6);
+    const Placement placement = keep_vertex(ring, closest_position(ring, start, 1e-6));
     // Every half step lowers the sum of squares, which bounds the largest distance from both sides.
     const double samples = static_cast<double>(ring.samples_before.size() + ring.neighbours_after.size() + 1);
     EXPECT_LE(placement.deviation, std::sqrt(samples) * keep_vertex(ring, start).deviation + 1e-9);
@@ -101,7 +101,7 @@ TEST(VertexPlacement, RestoresTheAreaOfCurvedRingsAndKeepsPlanesPlane) {
   EXPECT_LT(glm::length(restore_area(plane, x, with_same_volume(plane, x)) - x), 1e-9);
   for (const double curvature : {-0.3, -0.05, 0.05, 0.3}) {
     const CollapseRing bowl = grid_ring([=](double px, double py) { return curvature * (squared({px - 0.5, py, 0})); });
-    const dvec3 optimum = place_vertex(bowl, {0.5, 0.0, 0.0}, 1e-6).position;
+    const dvec3 optimum = closest_position(bowl, {0.5, 0.0, 0.0}, 1e-6);
     const double before = area_before(bowl);
     const double error = std::abs(area_after(bowl, optimum) - before);
     const double restored =
