@@ -10,24 +10,14 @@
 #include "base/result.h"
 #include "base/temporary_file.h"
 #include "evaluate/analysis_pictures.h"
+#include "evaluate/surface_area.h"
 #include "evaluate/views.h"
 #include "import/read_volume.h"
-#include "prefilter/triangle_pieces.h"
 
 namespace farfield {
 namespace {
 
 constexpr int kViews = 12;
-
-double area_of(const Surface& surface, size_t face) {
-  return 0.5 * glm::length(area_vector_of(corners_of(surface, face)));
-}
-
-double total_area(const Surface& surface) {
-  double area = 0;
-  for (size_t f = 0; f < surface.triangles.size(); ++f) area += area_of(surface, f);
-  return area;
-}
 
 /// Points of the distribution of `values`, which weigh `weights`.
 Spread spread_of(std::vector<std::pair<double, double>> value_and_weight) {
@@ -49,7 +39,7 @@ LevelAnalysis figures_of(const LevelSurfaces& level) {
   result.faces_before = level.macrosurface.triangles.size();
   result.faces = level.simplified.triangles.size();
   result.sub_resolution = level.sub_resolution.triangles.size();
-  const double macro = total_area(level.macrosurface), sub = total_area(level.sub_resolution);
+  const double macro = surface_area(level.macrosurface), sub = surface_area(level.sub_resolution);
   result.macrosurface_share = macro + sub > 0 ? macro / (macro + sub) : 0;
 
   std::vector<std::pair<double, double>> sizes;
@@ -57,7 +47,7 @@ LevelAnalysis figures_of(const LevelSurfaces& level) {
   const std::vector<float> size = face_sizes(level.simplified, level.resolution);
   const std::vector<float> rough = face_roughness(level.simplified);
   for (size_t f = 0; f < size.size(); ++f) {
-    const double weight = area_of(level.simplified, f);
+    const double weight = face_area(level.simplified, f);
     sizes.emplace_back(size[f], weight);
     roughness += weight * rough[f], area += weight;
   }

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "evaluate/surface_area.h"
 #include "evaluate/surface_distance.h"
 #include "prefilter/collapse_edges.h"
 #include "prefilter/triangle_pieces.h"
@@ -19,13 +20,6 @@ namespace farfield {
 namespace {
 
 constexpr int kSamples = 20000;
-
-double area_of(const Surface& surface) {
-  double area = 0;
-  for (size_t f = 0; f < surface.triangles.size(); ++f)
-    area += 0.5 * glm::length(area_vector_of(corners_of(surface, f)));
-  return area;
-}
 
 /// Enclosed by faces that are all wound alike; nothing where there are others or a border.
 std::optional<double> volume_of(const Surface& surface) {
@@ -53,7 +47,7 @@ SimplifierFigures figures_of(std::string name, const Surface& before, const Surf
   figures.faces = after.triangles.size();
   const SurfaceDistance distance = two_sided_distance(before, after, kSamples);
   figures.farthest = distance.farthest / resolution, figures.rms = distance.rms / resolution;
-  figures.area_change = area_of(after) / area_of(before) - 1;
+  figures.area_change = surface_area(after) / surface_area(before) - 1;
   const auto volume_before = volume_of(before), volume_after = volume_of(after);
   if (volume_before && volume_after) figures.volume_change = *volume_after / *volume_before - 1;
   return figures;
