@@ -9,6 +9,7 @@
 #include "base/parallel.h"
 #include "base/result.h"
 #include "evaluate/analysis.h"
+#include "evaluate/label.h"
 #include "evaluate/views.h"
 #include "prefilter/ray_scene.h"
 #include "prefilter/triangle_pieces.h"
@@ -16,7 +17,6 @@
 namespace farfield {
 namespace {
 
-constexpr vec3 kBackground{0.214f};  // mid-grey on the screen, as on other sheets
 constexpr vec3 kCircleColor{0.02f, 0.10f, 0.80f};
 constexpr int kSamples = 3;  ///< per pixel, along either axis
 
@@ -28,7 +28,7 @@ vec3 trace_color(const RayScene& scene, const OrthoView& view, float x, float y,
   const float up = (0.5f * static_cast<float>(view.height_px) - y) * view.pixel_size;
   const vec3 origin = view.center + right * view.right() + up * view.up - 0.5f * depth * view.direction;
   const auto hit = scene.first_hit(origin, view.direction, 0, depth);
-  if (!hit) return kBackground;
+  if (!hit) return vec3(kSheetBackground);
   const float cosine = std::abs(glm::dot(glm::normalize(hit->normal), view.direction));
   return (0.25f + 0.75f * cosine) * color_of(hit->triangle);
 }

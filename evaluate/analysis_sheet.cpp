@@ -10,7 +10,6 @@
 namespace farfield {
 namespace {
 
-constexpr vec3 kBackground{0.214f};
 constexpr int kGap = 8, kLine = kGlyphHeight + 2;
 
 void paste(Image& sheet, const Image& image, int x, int y) {
@@ -65,7 +64,7 @@ Image analysis_sheet(const Analysis& analysis) {
   }
   if (analysis.levels.empty()) return {};
   Image sheet(3 * column_px + 4 * kGap, height, {"R", "G", "B"});
-  std::fill(sheet.values.begin(), sheet.values.end(), kBackground.x);
+  std::fill(sheet.values.begin(), sheet.values.end(), kSheetBackground);
   draw_header(sheet, column_px);
   int y = 2 * kGap + kLine - 2;
   for (const LevelAnalysis& level : analysis.levels) {

@@ -10,7 +10,6 @@
 namespace farfield {
 namespace {
 
-constexpr float kBackground = 0.214f;  // linear; mid-grey on the screen
 constexpr int kGap = 8;
 const std::vector<std::string> kRgb = {"R", "G", "B"};
 
@@ -45,7 +44,7 @@ Image compose(const Image& rgba, float exposure) {
   for (int y = 0; y < rgba.height; ++y)
     for (int x = 0; x < rgba.width; ++x) {
       const float alpha = rgba.pixel(x, y)[3];
-      write_rgb(out, x, y, exposure * read_rgb(rgba, x, y) + kBackground * (1.0f - alpha));
+      write_rgb(out, x, y, exposure * read_rgb(rgba, x, y) + kSheetBackground * (1.0f - alpha));
     }
   return out;
 }
@@ -80,7 +79,7 @@ Image make_sheet(std::span<const SheetRow> rows, int cell_px) {
   const int header_px = kGlyphHeight + kGap;
 
   Image sheet(3 * cell_px + 4 * kGap, header_px + static_cast<int>(rows.size()) * row_px + kGap, kRgb);
-  std::fill(sheet.values.begin(), sheet.values.end(), kBackground);
+  std::fill(sheet.values.begin(), sheet.values.end(), kSheetBackground);
   const char* titles[] = {"source", "level", "difference (grey: none)"};
   for (int column = 0; column < 3; ++column)
     draw_text(sheet, kGap + column * (cell_px + kGap), kGap / 2, titles[column], vec3(1.0f));

@@ -8,6 +8,7 @@
 
 #include "base/random.h"
 #include "evaluate/nearest_point_grid.h"
+#include "evaluate/surface_area.h"
 #include "prefilter/surface.h"
 
 namespace farfield {
@@ -21,10 +22,7 @@ struct SurfaceDistance {
 inline SurfaceDistance one_sided_distance(const Surface& from, const Surface& to, int samples) {
   std::vector<double> area_below;
   double area = 0;
-  for (const uvec3& t : from.triangles) {
-    const dvec3 a(from.positions[t.x]), b(from.positions[t.y]), c(from.positions[t.z]);
-    area_below.push_back(area += glm::length(glm::cross(b - a, c - a)));
-  }
+  for (size_t f = 0; f < from.triangles.size(); ++f) area_below.push_back(area += face_area(from, f));
   const NearestPointGrid nearest(to);
   Rng rng(5);
   double farthest = 0, sum2 = 0;
