@@ -181,8 +181,10 @@ bool BrickVolume::cross_brick(Flight& flight, const Brick& brick, const ivec3& b
         const vec3 entry = flight.entry - corner;
         const int octant = octant_at(entry + flight.s_hit * flight.direction, walk.cell);
         const float acceptance = sigma * octant_share(octants_of(flight.payload_hit), octant);
-        flight.rate_hit = rate * acceptance;
-        if (acceptance >= 1.0f || flight.random.uniform() < acceptance) return true;
+        if (acceptance >= 1.0f || flight.random.uniform() < acceptance) {
+          flight.rate_hit = rate * acceptance;
+          return true;
+        }
         if (cross_octants(flight, walk.cell, entry, rate * sigma, flight.s_hit, s_next)) return true;
         flight.depth_left = flight.random.optical_depth();
       }
@@ -217,8 +219,10 @@ bool BrickVolume::skim_brick(Flight& flight, const Brick& brick, const ivec3& br
     flight.payload_hit = brick.payload_index(voxel);
     const float share_here = share * octant_share(octants_of(flight.payload_hit), octant_at(p, cell));
     const float area = share_here * projected_area(flight.payload_hit, flight.unit_direction);
-    flight.rate_hit = brick.density_scale * flight.speed * area;
-    if (u * bound < area) return true;
+    if (u * bound < area) {
+      flight.rate_hit = brick.density_scale * flight.speed * area;
+      return true;
+    }
   }
 }
 
