@@ -10,8 +10,8 @@
 
 namespace farfield {
 
-inline constexpr int kGlyphWidth = 6;   ///< pixels from one letter to the next
-inline constexpr int kGlyphHeight = 8;  ///< pixels from one line to the next
+inline constexpr int kGlyphWidth = 6;              ///< pixels from one letter to the next
+inline constexpr int kGlyphHeight = 8;             ///< pixels from one line to the next
 inline constexpr float kSheetBackground = 0.214f;  ///< linear grey behind text and pictures; mid-grey on the screen
 
 /// Writes `text` with its upper left corner at (x, y) into the first three channels, in linear `color`. Letters are
