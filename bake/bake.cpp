@@ -579,8 +579,7 @@ Result<BakeReport> bake_unless_up_to_date(Task task, const fs::path& out, const 
   const auto find_same = [&]() -> std::optional<Manifest> {
     auto manifest = read_manifest(out);
     const bool is_same = manifest && are_same_bake(*manifest, report.manifest) && is_whole(out, *manifest);
-    return is_same && !options.even_if_up_to_date && !options.surfaces_only ? std::optional(std::move(*manifest))
-                                                                            : std::nullopt;
+    return is_same && !options.even_if_up_to_date ? std::optional(std::move(*manifest)) : std::nullopt;
   };
   if (auto manifest = find_same()) return nothing_to_do(std::move(*manifest), watch);
   FARFIELD_TRY_LET(auto workspace, with_warnings(BakeWorkspace::open(out, options.job), report.warnings));
@@ -620,7 +619,6 @@ ImportOptions import_options(const BakeOptions& options) {
 }
 
 std::optional<Manifest> find_up_to_date(const fs::path& source, const fs::path& out, const BakeOptions& options) {
-  if (options.surfaces_only) return std::nullopt;  // whoever wants to see them has not seen them yet
   auto manifest = read_manifest(out);
   if (!manifest || !manifest->source_files) return std::nullopt;
   const auto source_hash = hash_source(source, *manifest->source_files, options.import);

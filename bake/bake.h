@@ -45,7 +45,7 @@ struct BakeOptions {
   /// Called by the baking thread for each level of a mesh that is made, from 1 on; its error ends the bake.
   std::function<Result<void>(const LevelSurfaces&)> see_surfaces;
   /// Only for see_surfaces: nothing is voxelised, of levels none but the source is weighed against their bytes, and no
-  /// asset is left in `out`.
+  /// asset is left in `out`. That holds none before, or there may be nothing to do.
   bool surfaces_only = false;
 
   /// What a level costs a host. Empty: measured by loading it as the runtime would (measure_level_scene).

@@ -13,6 +13,7 @@
 #include "evaluate/surface_area.h"
 #include "evaluate/views.h"
 #include "import/read_volume.h"
+#include "prefilter/triangle_pieces.h"
 
 namespace farfield {
 namespace {
@@ -33,7 +34,22 @@ Spread spread_of(std::vector<std::pair<double, double>> value_and_weight) {
   return spread;
 }
 
-LevelAnalysis figures_of(const LevelSurfaces& level) {
+FaceFigures figures_of_faces(const Surface& surface, double resolution) {
+  FaceFigures figures;
+  for (size_t f = 0; f < surface.triangles.size(); ++f) {
+    const uvec3& t = surface.triangles[f];
+    float longest = 0;
+    for (int c = 0; c < 3; ++c)
+      longest = std::max(longest, glm::distance(surface.positions[t[c]], surface.positions[t[(c + 1) % 3]]));
+    figures.size.push_back(longest / static_cast<float>(resolution));
+    const dvec3 across = area_vector_of(corners_of(surface, f));
+    const double length = glm::length(across);
+    figures.roughness.push_back(length > 0 ? normal_roughness(surface.materials[f], vec3(across / length)) : 0.0f);
+  }
+  return figures;
+}
+
+LevelAnalysis figures_of(const LevelSurfaces& level, const FaceFigures& faces) {
   LevelAnalysis result;
   result.level = level.level, result.grid = level.grid, result.resolution = level.resolution;
   result.faces_before = level.macrosurface.triangles.size();
@@ -44,12 +60,10 @@ LevelAnalysis figures_of(const LevelSurfaces& level) {
 
   std::vector<std::pair<double, double>> sizes;
   double roughness = 0, area = 0;
-  const std::vector<float> size = face_sizes(level.simplified, level.resolution);
-  const std::vector<float> rough = face_roughness(level.simplified);
-  for (size_t f = 0; f < size.size(); ++f) {
+  for (size_t f = 0; f < faces.size.size(); ++f) {
     const double weight = face_area(level.simplified, f);
-    sizes.emplace_back(size[f], weight);
-    roughness += weight * rough[f], area += weight;
+    sizes.emplace_back(faces.size[f], weight);
+    roughness += weight * faces.roughness[f], area += weight;
   }
   result.face_size = spread_of(std::move(sizes));
   result.normal_roughness = area > 0 ? roughness / area : 0;
@@ -83,13 +97,14 @@ Result<Analysis> analyse(const AnalyseOptions& options) {
   BakeOptions bake_options = options.bake;
   bake_options.surfaces_only = true;
   bake_options.see_surfaces = [&](const LevelSurfaces& level) -> Result<void> {
-    LevelAnalysis figures = figures_of(level);
+    const FaceFigures faces = figures_of_faces(level.simplified, level.resolution);
+    LevelAnalysis figures = figures_of(level, faces);
     if (options.cell_px > 0) {
       if (bounds.is_empty()) {
         bounds = level.macrosurface.bounds();
         bounds.extend(level.sub_resolution.bounds());
       }
-      FARFIELD_TRY_LET(figures.pictures, draw_analysis(level, bounds, direction, options.cell_px));
+      FARFIELD_TRY_LET(figures.pictures, draw_analysis(level, faces, bounds, direction, options.cell_px));
     }
     if (options.compare && !level.macrosurface.triangles.empty())
       figures.simplifiers = compare_simplifiers(level.macrosurface, level.simplified, level.resolution);

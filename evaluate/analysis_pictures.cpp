@@ -8,11 +8,9 @@
 
 #include "base/parallel.h"
 #include "base/result.h"
-#include "evaluate/analysis.h"
 #include "evaluate/label.h"
 #include "evaluate/views.h"
 #include "prefilter/ray_scene.h"
-#include "prefilter/triangle_pieces.h"
 
 namespace farfield {
 namespace {
@@ -79,27 +77,6 @@ ColorOfFace by_scale(const std::vector<float>& values) {
 
 }  // namespace
 
-std::vector<float> face_sizes(const Surface& surface, double resolution) {
-  std::vector<float> sizes;
-  for (const uvec3& t : surface.triangles) {
-    float longest = 0;
-    for (int c = 0; c < 3; ++c)
-      longest = std::max(longest, glm::distance(surface.positions[t[c]], surface.positions[t[(c + 1) % 3]]));
-    sizes.push_back(longest / static_cast<float>(resolution));
-  }
-  return sizes;
-}
-
-std::vector<float> face_roughness(const Surface& surface) {
-  std::vector<float> roughness;
-  for (size_t f = 0; f < surface.triangles.size(); ++f) {
-    const dvec3 across = area_vector_of(corners_of(surface, f));
-    const double length = glm::length(across);
-    roughness.push_back(length > 0 ? normal_roughness(surface.materials[f], vec3(across / length)) : 0.0f);
-  }
-  return roughness;
-}
-
 vec3 scale_color(float value) {
   constexpr std::array<vec3, 4> kColors = {vec3(0.05f, 0.01f, 0.20f), vec3(0.02f, 0.20f, 0.40f),
                                            vec3(0.10f, 0.50f, 0.15f), vec3(1.00f, 0.80f, 0.05f)};
@@ -108,8 +85,8 @@ vec3 scale_color(float value) {
   return glm::mix(kColors[i], kColors[i + 1], at - static_cast<float>(i));
 }
 
-Result<std::vector<Image>> draw_analysis(const LevelSurfaces& level, const Box3& bounds, const vec3& direction,
-                                         int longest_px) {
+Result<std::vector<Image>> draw_analysis(const LevelSurfaces& level, const FaceFigures& faces, const Box3& bounds,
+                                         const vec3& direction, int longest_px) {
   const OrthoView coarse = frame_view(bounds, direction, 1e-3f * glm::length(bounds.size()));
   const float extent = coarse.pixel_size * static_cast<float>(std::max(coarse.width_px, coarse.height_px));
   OrthoView view = frame_view(bounds, direction, extent / static_cast<float>(longest_px - 4));
@@ -121,10 +98,8 @@ Result<std::vector<Image>> draw_analysis(const LevelSurfaces& level, const Box3&
                    draw(join_faces(level.macrosurface, level.sub_resolution), view, depth,
                         [&](uint32_t f) { return f < macro_faces ? kMacrosurfaceColor : kSubResolutionColor; }));
   draw_circle(parts, static_cast<float>(level.resolution) / view.pixel_size);
-  const std::vector<float> sizes = face_sizes(level.simplified, level.resolution);
-  FARFIELD_TRY_LET(Image by_size, draw(level.simplified, view, depth, by_scale(sizes)));
-  const std::vector<float> roughness = face_roughness(level.simplified);
-  FARFIELD_TRY_LET(Image by_roughness, draw(level.simplified, view, depth, by_scale(roughness)));
+  FARFIELD_TRY_LET(Image by_size, draw(level.simplified, view, depth, by_scale(faces.size)));
+  FARFIELD_TRY_LET(Image by_roughness, draw(level.simplified, view, depth, by_scale(faces.roughness)));
   return std::vector<Image>{std::move(parts), std::move(by_size), std::move(by_roughness)};
 }
 

@@ -60,8 +60,12 @@ Surface with_placement(const Surface& before, VertexPlacement placement, double 
   return collapse_edges(before, options).surface;
 }
 
+}  // namespace
+
 #ifdef FARFIELD_HAS_MESHOPTIMIZER
-Surface with_quadrics(const Surface& before, size_t faces) {
+bool has_quadrics() { return true; }
+
+Surface simplified_by_quadrics(const Surface& before, size_t faces) {
   std::vector<uint32_t> kept(3 * before.triangles.size());
   kept.resize(meshopt_simplify(kept.data(), &before.triangles[0].x, kept.size(), &before.positions[0].x,
                                before.positions.size(), sizeof(vec3), 3 * faces, FLT_MAX, 0, nullptr));
@@ -73,17 +77,11 @@ Surface with_quadrics(const Surface& before, size_t faces) {
   }
   return after;
 }
-#endif
-
-}  // namespace
-
-bool has_quadrics() {
-#ifdef FARFIELD_HAS_MESHOPTIMIZER
-  return true;
 #else
-  return false;
+bool has_quadrics() { return false; }
+
+Surface simplified_by_quadrics(const Surface&, size_t) { return {}; }
 #endif
-}
 
 std::vector<SimplifierFigures> compare_simplifiers(const Surface& before, const Surface& simplified,
                                                    double resolution) {
@@ -91,10 +89,8 @@ std::vector<SimplifierFigures> compare_simplifiers(const Surface& before, const 
   for (const auto& [name, placement] : {std::pair("equal volume", VertexPlacement::EqualVolume),
                                         std::pair("closest points", VertexPlacement::ClosestPoints)})
     all.push_back(figures_of(name, before, with_placement(before, placement, resolution), resolution));
-#ifdef FARFIELD_HAS_MESHOPTIMIZER
-  const Surface quadrics = with_quadrics(before, simplified.triangles.size());
+  const Surface quadrics = simplified_by_quadrics(before, simplified.triangles.size());
   if (!quadrics.triangles.empty()) all.push_back(figures_of("quadrics", before, quadrics, resolution));
-#endif
   return all;
 }
 

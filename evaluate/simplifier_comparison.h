@@ -27,5 +27,8 @@ std::vector<SimplifierFigures> compare_simplifiers(const Surface& before, const 
 
 /// Whether this program was built with meshoptimizer.
 bool has_quadrics();
+/// What meshoptimizer's simplifier leaves of a surface that is not empty, in about so many faces: positions as they
+/// were, no faces without area, no materials. Empty without has_quadrics().
+Surface simplified_by_quadrics(const Surface& before, size_t faces);
 
 }  // namespace farfield

@@ -34,7 +34,9 @@ struct PathRay {
   vec3 direction{0.0f};
   float cone_width = 0;
   float cone_spread = 0;
-  float scatter_pdf = 0;  ///< with which the direction was drawn at the vertex it leaves
+  // With which the direction was drawn at the vertex it leaves, per steradian: by scattering, and towards the light.
+  float scatter_pdf = 0;
+  float light_pdf = 0;
 };
 
 class PathTracer {
@@ -52,7 +54,7 @@ class PathTracer {
   bool intersect(const PathRay& ray);
   bool is_occluded(const PathRay& ray, float distance);
   void set_context(RayContext& context, const PathRay& ray);
-  PathRay leave(const Interaction& vertex, const ScatterSample& sample, const PathRay& incoming) const;
+  PathRay leave(const Interaction& vertex, const ScatterSample& sample, float light_pdf, const PathRay& incoming) const;
   void add_environment(const PathRay& ray);
   void add_sampled_environment(const Interaction& vertex, const PathRay& incoming);
   bool is_worth_a_ray(const Interaction& vertex, vec3& scattered);
@@ -109,16 +111,18 @@ bool PathTracer::is_occluded(const PathRay& ray, float distance) {
 // The ray from a vertex into sample.wi. Its cone starts as wide as the incoming one is there, and spreads as directions
 // lie apart that scattering *and* the light's own sampling draw: towards a sun they lie close, and a lobe's wide cone
 // would take the shadows of trees from their coarsest levels.
-PathRay PathTracer::leave(const Interaction& vertex, const ScatterSample& sample, const PathRay& incoming) const {
+PathRay PathTracer::leave(const Interaction& vertex, const ScatterSample& sample, float light_pdf,
+                          const PathRay& incoming) const {
   const float distance = glm::length(vertex.position - incoming.origin);
   PathRay ray;
   ray.origin = vertex.ray_origin(sample.wi);
   ray.direction = sample.wi;
   ray.cone_width = incoming.cone_width + incoming.cone_spread * distance;
   ScatterSample drawn = sample;
-  drawn.pdf += lights_.environment.pdf(sample.wi);
+  drawn.pdf += light_pdf;
   ray.cone_spread = vertex.next_cone_spread(drawn, incoming.cone_spread);
   ray.scatter_pdf = sample.pdf;
+  ray.light_pdf = light_pdf;
   return ray;
 }
 
@@ -140,7 +144,7 @@ void PathTracer::add_environment(const PathRay& ray) {
   }
   if (options_.strategy == LightStrategy::LightSamples) return;
   const bool mixed = options_.strategy == LightStrategy::Mis;
-  add(mixed ? radiance * power_weight(ray.scatter_pdf, lights_.environment.pdf(ray.direction)) : radiance);
+  add(mixed ? radiance * power_weight(ray.scatter_pdf, ray.light_pdf) : radiance);
 }
 
 // Next-event estimation of the environment.
@@ -151,7 +155,7 @@ void PathTracer::add_sampled_environment(const Interaction& vertex, const PathRa
   vec3 scattered = vertex.eval(light.wi, rng_);
   if (!is_worth_a_ray(vertex, scattered)) return;
   const ScatterSample as_scattered{light.wi, vec3(0.0f), vertex.pdf(light.wi)};
-  if (is_occluded(leave(vertex, as_scattered, incoming), kInfinity)) return;
+  if (is_occluded(leave(vertex, as_scattered, light.pdf, incoming), kInfinity)) return;
   const bool mixed = options_.strategy == LightStrategy::Mis;
   const float weight = mixed ? power_weight(light.pdf, as_scattered.pdf) : 1.0f;
   add(scattered * light.radiance * (weight / light.pdf));
@@ -182,8 +186,7 @@ void PathTracer::add_point_lights(const Interaction& vertex, const PathRay& inco
     if (falloff <= 0) continue;
     vec3 scattered = vertex.eval(wi, rng_);
     if (!is_worth_a_ray(vertex, scattered)) continue;
-    const ScatterSample only_way{wi, vec3(0.0f), kInfinity};  // spreads no cone
-    const PathRay ray = leave(vertex, only_way, incoming);
+    const PathRay ray = leave(vertex, ScatterSample{.wi = wi}, kInfinity, incoming);  // spreads no cone
     if (is_occluded(ray, glm::length(light.position - ray.origin))) continue;
     add(scattered * light.intensity * (falloff / distance2));
   }
@@ -224,7 +227,7 @@ FilmSample PathTracer::trace(const CameraRay& camera_ray, float time, uint64_t p
   last_hit_ = HitRecord();
 
   FilmSample result;
-  PathRay ray{camera_ray.origin, camera_ray.direction, camera_ray.cone_width, camera_ray.cone_spread, 0.0f};
+  PathRay ray{camera_ray.origin, camera_ray.direction, camera_ray.cone_width, camera_ray.cone_spread};
   for (;;) {
     if (!intersect(ray)) {
       add_environment(ray);
@@ -242,7 +245,7 @@ FilmSample PathTracer::trace(const CameraRay& camera_ray, float time, uint64_t p
     if (!(next.pdf > 0) || !(max_component(next.weight) > 0)) break;
     throughput_ *= next.weight;
     if (!survives_roulette()) break;
-    ray = leave(vertex, next, ray);
+    ray = leave(vertex, next, lights_.environment.pdf(next.wi), ray);
   }
   if (is_finite(color_)) {
     result.color = color_;

@@ -99,11 +99,8 @@ void add_analyse_command(CLI::App& app, Action& action) {
                     "volume");
   command->add_option("--finest-grid", options.bake.finest_grid, "As of bake")->capture_default_str();
   command->add_option("--coarsest-grid", options.bake.coarsest_grid, "As of bake")->capture_default_str();
-  CLI::Option* mesh = command->add_option("--mesh", options.bake.import.mesh, "glTF: only this mesh, in its own space")
-                          ->check(CLI::Range(0, 1 << 20));
-  command->add_option("--node", options.bake.import.node, "glTF: only what this node and those below it show")
-      ->check(CLI::Range(0, 1 << 30))
-      ->excludes(mesh);
+  add_part_flags(command, options.bake.import, "glTF: only this mesh, in its own space",
+                 "glTF: only what this node and those below it show");
   add_subdivision_flags(command, options.bake.import.subdivision);
   add_simplify_flag(command, options.bake.simplify);
   command->add_option("--view", options.view, "Number of one of the twelve directions of evaluate, 0 to 11")

@@ -177,18 +177,14 @@ void add_bake_command(CLI::App& app, Action& action) {
   command->add_option("--rays-per-voxel", options.rays_per_voxel, "Rays that measure each voxel's occlusion")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  CLI::Option* mesh = command->add_option("--mesh", options.import.mesh, "glTF: bake only this mesh, in its own space")
-                          ->check(CLI::Range(0, 1 << 20));
-  CLI::Option* node =
-      command->add_option("--node", options.import.node, "glTF: bake only what this node and those below it show")
-          ->check(CLI::Range(0, 1 << 30))
-          ->excludes(mesh);
+  add_part_flags(command, options.import, "glTF: bake only this mesh, in its own space",
+                 "glTF: bake only what this node and those below it show");
   CLI::Option* scene = command
                            ->add_flag("--scene", arguments->whole_scene,
                                       "glTF: bake each asset of the scene, into folders in the one given by -o, as "
                                       "render and shot do")
-                           ->excludes(mesh)
-                           ->excludes(node);
+                           ->excludes(command->get_option("--mesh"))
+                           ->excludes(command->get_option("--node"));
   add_parsed_option(command, "--assemblies", arguments->assemblies, parse_assembly_rule,
                     "With --scene, what is one asset: repeated, marked, none")
       ->default_str(name_of(arguments->assemblies))

@@ -107,11 +107,8 @@ void add_evaluate_command(CLI::App& app, Action& action) {
       ->required()
       ->check(is_named);
   command->add_option("--source", arguments->source, "The model it was baked from")->required()->check(is_named);
-  CLI::Option* mesh = command->add_option("--mesh", options.import.mesh, "glTF: the mesh that was baked")
-                          ->check(CLI::Range(0, 1 << 20));
-  command->add_option("--node", options.import.node, "glTF: the node that was baked with all below it")
-      ->check(CLI::Range(0, 1 << 30))
-      ->excludes(mesh);
+  add_part_flags(command, options.import, "glTF: the mesh that was baked",
+                 "glTF: the node that was baked with all below it");
   add_fog_flags(command, options.import.fog);
   add_subdivision_flags(command, options.import.subdivision);
   command->add_flag("--other-source", options.other_source,

@@ -75,11 +75,8 @@ void add_info_command(CLI::App& app, Action& action) {
                    "Baked folder, or a model: OBJ, PLY, glTF or glb, gzipped or not; or a volume: .vdb, .nvdb")
       ->required()
       ->check(is_named);
-  CLI::Option* mesh = command->add_option("--mesh", arguments->import.mesh, "glTF model: only this mesh, as for bake")
-                          ->check(CLI::Range(0, 1 << 20));
-  command->add_option("--node", arguments->import.node, "glTF model: only this node and those below it, as for bake")
-      ->check(CLI::Range(0, 1 << 30))
-      ->excludes(mesh);
+  add_part_flags(command, arguments->import, "glTF model: only this mesh, as for bake",
+                 "glTF model: only this node and those below it, as for bake");
   add_fog_flags(command, arguments->import.fog);
   add_subdivision_flags(command, arguments->import.subdivision);
   command->add_flag("--json", arguments->as_json, "Print JSON");

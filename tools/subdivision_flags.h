@@ -9,6 +9,12 @@
 
 namespace farfield::tool {
 
+/// Which part of a glTF file: a mesh or a node.
+inline void add_part_flags(CLI::App* command, ImportOptions& options, const char* mesh_help, const char* node_help) {
+  CLI::Option* mesh = command->add_option("--mesh", options.mesh, mesh_help)->check(CLI::Range(0, 1 << 20));
+  command->add_option("--node", options.node, node_help)->check(CLI::Range(0, 1 << 30))->excludes(mesh);
+}
+
 /// What a mesh does not say itself.
 inline void add_subdivision_flags(CLI::App* command, SubdivisionOptions& options) {
   CLI::Option* scheme =

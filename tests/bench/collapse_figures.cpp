@@ -7,15 +7,14 @@
 // A bumpy sphere; faces are a sixth of the resolution wide at first. Distances are measured from points on either
 // surface to the other, by no code of either simplifier. For docs/results/surfaces.md.
 #include <fmt/format.h>
-#include <meshoptimizer.h>
 
-#include <cfloat>
 #include <cmath>
 #include <cstdlib>
 #include <string>
 #include <vector>
 
 #include "base/process_time.h"
+#include "evaluate/simplifier_comparison.h"
 #include "evaluate/surface_distance.h"
 #include "prefilter/macrosurface.h"
 #include "prefilter/simplify.h"
@@ -31,24 +30,6 @@ Surface make_source(int faces) {
   Surface sphere = test::make_sphere(2 * rings, rings, 1.0f);
   for (vec3& p : sphere.positions) p *= 1.0f + 0.01f * std::sin(40 * p.x) * std::sin(40 * p.y) * std::sin(40 * p.z);
   return sphere;
-}
-
-std::vector<uint32_t> quadrics(const Surface& source, size_t faces) {
-  std::vector<uint32_t> kept(3 * source.triangles.size());
-  kept.resize(meshopt_simplify(kept.data(), &source.triangles[0].x, kept.size(), &source.positions[0].x,
-                               source.positions.size(), sizeof(vec3), 3 * faces, FLT_MAX, 0, nullptr));
-  return kept;
-}
-
-Surface surface_of(const Surface& source, const std::vector<uint32_t>& indices) {
-  Surface result;
-  result.positions = source.positions;
-  for (size_t i = 0; i < indices.size(); i += 3) {
-    const uvec3 t(indices[i], indices[i + 1], indices[i + 2]);
-    const dvec3 a(source.positions[t.x]), b(source.positions[t.y]), c(source.positions[t.z]);
-    if (glm::length(glm::cross(b - a, c - a)) > 0) result.triangles.push_back(t);
-  }
-  return result;
 }
 
 template <typename Work>
@@ -77,9 +58,10 @@ void measure(int faces) {
   SimplifyResult ours;
   const double seconds = cpu_seconds([&] { ours = simplify(source, {static_cast<float>(resolution)}); });
   print_row("edge collapse", source, ours.surface, resolution, seconds);
-  std::vector<uint32_t> kept;
-  const double of_quadrics = cpu_seconds([&] { kept = quadrics(source, ours.surface.triangles.size()); });
-  print_row("meshopt_simplify", source, surface_of(source, kept), resolution, of_quadrics);
+  Surface quadrics;
+  const double of_quadrics =
+      cpu_seconds([&] { quadrics = simplified_by_quadrics(source, ours.surface.triangles.size()); });
+  print_row("meshopt_simplify", source, quadrics, resolution, of_quadrics);
   std::fflush(stdout);
 }
 
