@@ -63,35 +63,62 @@ fs::path find_by_last_name(const fs::path& folder, const fs::path& named) {
 namespace {
 
 /// From the bytes that were just read, except of formats that only a file's name tells (TGA).
-Result<Texture> to_texture(const Result<std::vector<unsigned char>>& bytes, const fs::path& path, TextureUse use) {
+template <typename Decode, typename Read>
+auto to_image(const Result<std::vector<unsigned char>>& bytes, const Decode& decode, const Read& read) {
   if (bytes) {
-    auto image = decode_texture(*bytes, path.string(), use);
+    auto image = decode(*bytes);
     if (image || image.error().code != ErrorCode::Unsupported) return image;
   }
-  return read_texture(path, use);
+  return read();
 }
 
 }  // namespace
+
+ImageFiles::Found ImageFiles::find(const fs::path& folder, const fs::path& named) {
+  auto bytes = read_noted(named);
+  const fs::path other = bytes ? fs::path() : find_by_last_name(folder, named);
+  if (other.empty()) return {named, std::move(bytes)};
+  mesh_.warnings.push_back(fmt::format("texture {}: not there; {} is taken", named.string(), other.string()));
+  return {other, read_noted(other)};
+}
+
+void ImageFiles::miss(const Error& error, const char* instead) {
+  if (error.code == ErrorCode::Io) {
+    ready_ = tl::unexpected(error);
+  } else {
+    mesh_.warnings.push_back(fmt::format("texture: {}; {}", error.message, instead));
+  }
+}
 
 std::shared_ptr<const Texture> ImageFiles::read(const fs::path& folder, std::string_view name, TextureUse use) {
   const fs::path named = folder / with_slashes(name);
   const auto [found, is_new] = images_.try_emplace({named.string(), use});
   if (!is_new) return found->second;
-  fs::path path = named;
-  auto bytes = read_noted(named);
-  if (const fs::path other = bytes ? fs::path() : find_by_last_name(folder, named); !other.empty()) {
-    path = other;
-    bytes = read_noted(path);
-    mesh_.warnings.push_back(fmt::format("texture {}: not there; {} is taken", named.string(), path.string()));
-  }
-  auto image = to_texture(bytes, path, use);
+  const Found file = find(folder, named);
+  auto image = to_image(
+      file.bytes, [&](const auto& bytes) { return decode_texture(bytes, file.path.string(), use); },
+      [&] { return read_texture(file.path, use); });
   if (image) return found->second = std::make_shared<const Texture>(std::move(*image));
-  if (image.error().code == ErrorCode::Io) {
-    ready_ = tl::unexpected(image.error());
+  miss(image.error(), "the plain colour is used");
+  return nullptr;
+}
+
+std::shared_ptr<const HeightMap> ImageFiles::read_heights(const fs::path& folder, std::string_view name, char channel) {
+  const fs::path named = folder / with_slashes(name);
+  const auto [found, is_new] = heights_.try_emplace({named.string(), channel});
+  if (!is_new) return found->second;
+  const Found file = find(folder, named);
+  auto map = to_image(
+      file.bytes, [&](const auto& bytes) { return decode_heights(bytes, file.path.string(), channel); },
+      [&] { return farfield::read_heights(file.path, channel); });
+  if (!map) {
+    miss(map.error(), "the surface is not displaced");
     return nullptr;
   }
-  mesh_.warnings.push_back(fmt::format("texture: {}; the plain colour is used", image.error().message));
-  return nullptr;
+  if (const std::string mended = what_was_mended(*map, file.path.string()); !mended.empty()) {
+    mesh_.warnings.push_back(mended);
+  }
+  return found->second = std::make_shared<const HeightMap>(std::move(*map));
 }
 
 }  // namespace farfield

@@ -25,13 +25,28 @@ class ImageFiles {
   /// stands alone. A path of another computer is looked for by its last part.
   std::shared_ptr<const Texture> read(const std::filesystem::path& folder, std::string_view name, TextureUse use);
 
+  /// The heights in a channel (as MtlMap has it) of the image that a file in `folder` names; null, with a warning, when
+  /// they cannot be had. Values that are not finite are a warning, too.
+  std::shared_ptr<const HeightMap> read_heights(const std::filesystem::path& folder, std::string_view name,
+                                                char channel);
+
   /// An error once an image was wanted and none can be read: no fault of the file, so no case for plain colours.
   const Result<void>& ready() const { return ready_; }
 
  private:
+  struct Found {
+    std::filesystem::path path;
+    Result<std::vector<unsigned char>> bytes;
+  };
+
+  Found find(const std::filesystem::path& folder, const std::filesystem::path& named);
+  /// Says why an image is not there; `instead` is what becomes of it.
+  void miss(const Error& error, const char* instead);
+
   std::filesystem::path folder_;
   SourceMesh& mesh_;
   std::map<std::pair<std::string, TextureUse>, std::shared_ptr<const Texture>> images_;
+  std::map<std::pair<std::string, char>, std::shared_ptr<const HeightMap>> heights_;
   Result<void> ready_;
 };
 

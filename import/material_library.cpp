@@ -93,8 +93,7 @@ Result<void> MaterialLibraries::finish() {
   for (const Entry& entry : entries_) {
     const auto used = by_name_.find(entry.mtl.name);
     if (used == by_name_.end() || latest[entry.mtl.name] != &entry) continue;
-    mesh_.materials[used->second] = convert(entry, uv_[used->second]);
-    defined_.insert(used->second);
+    set(used->second, entry);
   }
   for (const auto& [name, index] : by_name_) {
     const std::string wanted = lower_case(name);
@@ -103,14 +102,22 @@ Result<void> MaterialLibraries::finish() {
         std::ranges::find_if(latest, [&](const auto& entry) { return lower_case(entry.first) == wanted; });
     if (similar != latest.end()) {
       warn(fmt::format("material {} is taken for {}, which differs in upper and lower case", name, similar->first));
-      mesh_.materials[index] = convert(*similar->second, uv_[index]);
-      defined_.insert(index);
+      set(index, *similar->second);
       continue;
     }
     warn(fmt::format("material {} is not in any library that was read; default grey", name));
   }
   keep_what_would_vanish();
   return images_.ready();
+}
+
+void MaterialLibraries::set(uint32_t material, const Entry& entry) {
+  mesh_.materials[material] = convert(entry, uv_[material]);
+  defined_.insert(material);
+  SourceHeights displacement = heights(entry);
+  if (!displacement) return;
+  mesh_.heights.resize(mesh_.materials.size());
+  mesh_.heights[material] = std::move(displacement);
 }
 
 SourceMaterial MaterialLibraries::convert(const Entry& entry, UvTransform& uv) {
@@ -124,7 +131,8 @@ SourceMaterial MaterialLibraries::convert(const Entry& entry, UvTransform& uv) {
   set_emission(entry, out);
   set_normals(entry, out);
   const MtlMap* first = nullptr;
-  for (const MtlMap* map : {&mtl.map_kd, &mtl.map_pr, &mtl.map_pm, &mtl.map_d, &mtl.map_ke, &mtl.norm, &mtl.bump}) {
+  for (const MtlMap* map :
+       {&mtl.map_kd, &mtl.map_pr, &mtl.map_pm, &mtl.map_d, &mtl.map_ke, &mtl.norm, &mtl.bump, &mtl.disp}) {
     if (!*map) continue;
     if (!first) first = map;
     if (map->scale != first->scale || map->offset != first->offset) {
@@ -229,6 +237,10 @@ void MaterialLibraries::set_normals(const Entry& entry, SourceMaterial& out) {
   const MtlMaterial& mtl = entry.mtl;
   const MtlMap& map = mtl.norm ? mtl.norm : mtl.bump;
   if (!map) return;
+  if (!mtl.norm && mtl.disp && mtl.disp.file == mtl.bump.file) {
+    warn(fmt::format("material {}: bump is the map of disp, which moves the surface itself; ignored", mtl.name));
+    return;
+  }
   out.normal_map = texture(entry, map, TextureUse::Data);
   if (!out.normal_map) return;
   if (mtl.norm && mtl.bump && mtl.bump.file != mtl.norm.file) {
@@ -242,6 +254,19 @@ void MaterialLibraries::set_normals(const Entry& entry, SourceMaterial& out) {
   }
   out.normal_map.image = std::make_shared<const Texture>(
       normals_of_heights(*out.normal_map.image, map.channel, map.bump_scale, out.normal_map.wrap_u));
+}
+
+/// Heights are -bm * (base + gain * texel), with base and gain of -mm, in the file's units.
+SourceHeights MaterialLibraries::heights(const Entry& entry) {
+  const MtlMap& map = entry.mtl.disp;
+  if (!map) return {};
+  SourceHeights out;
+  out.map = images_.read_heights(entry.file.parent_path(), map.file, map.channel);
+  out.name = map.file;
+  if (map.is_clamped) out.wrap_u = out.wrap_v = Wrap::Clamp;
+  out.gain = map.bump_scale * map.gain;
+  out.base = map.bump_scale * map.base;
+  return out;
 }
 
 /// What map_d says, from the channel that -imfchan names.

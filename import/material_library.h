@@ -53,12 +53,14 @@ class MaterialLibraries {
   void warn(std::string text) { mesh_.warnings.push_back(std::move(text)); }
   bool load_file(const std::filesystem::path& path);
   bool zero_means_opaque() const;
+  void set(uint32_t material, const Entry& entry);
   SourceMaterial convert(const Entry& entry, UvTransform& uv);
   void set_alpha(const Entry& entry, SourceMaterial& out);
   void set_color(const Entry& entry, SourceMaterial& out);
   void set_metallic_roughness_map(const Entry& entry, SourceMaterial& out);
   void set_emission(const Entry& entry, SourceMaterial& out);
   void set_normals(const Entry& entry, SourceMaterial& out);
+  SourceHeights heights(const Entry& entry);
   SourceTexture mask(const Entry& entry, const MtlMap& map);
   SourceTexture texture(const Entry& entry, const MtlMap& map, TextureUse use);
   void keep_what_would_vanish();

@@ -151,6 +151,7 @@ class MtlReader {
                   : is_one_of(key, {"map_ke", "map_emissive"})     ? &m.map_ke
                   : is_one_of(key, {"norm", "map_kn", "map_norm"}) ? &m.norm
                   : is_one_of(key, {"bump", "map_bump"})           ? &m.bump
+                  : is_one_of(key, {"disp", "map_disp"})           ? &m.disp
                                                                    : nullptr;
     if (!map) return false;
     if (map == &m.map_d && key.starts_with("map_tr")) warn_once("is read as map_d: white is opaque");
@@ -184,7 +185,7 @@ class MtlReader {
       const std::string value = lower_case(take_word(after));
       if (option == "-clamp")
         map.is_clamped = value == "on";
-      else if (option == "-bm" && (&map == &material().bump || &map == &material().norm))
+      else if (option == "-bm" && takes_scale(map))
         map.bump_scale = to_number(value).value_or(1);
       else if (option == "-imfchan" && takes_channel(map))
         map.channel = is_one_of(value, {"r", "g", "b", "m", "l"}) ? value[0] : 0;
@@ -195,9 +196,14 @@ class MtlReader {
     return true;
   }
 
+  bool takes_scale(const MtlMap& map) {
+    MtlMaterial& m = material();
+    return &map == &m.bump || &map == &m.norm || &map == &m.disp;
+  }
+
   bool takes_channel(const MtlMap& map) {
     MtlMaterial& m = material();
-    return &map == &m.map_d || &map == &m.map_pr || &map == &m.map_pm || &map == &m.bump;
+    return &map == &m.map_d || &map == &m.map_pr || &map == &m.map_pm || &map == &m.bump || &map == &m.disp;
   }
 
   void read_numbers(const std::string& option, int most, std::string_view& rest, MtlMap& map) {
@@ -211,6 +217,11 @@ class MtlReader {
     for (int c = 0; c < std::min(count, 2); ++c) {
       if (option == "-s") map.scale[c] = values[c];
       if (option == "-o") map.offset[c] = values[c];
+    }
+    if (option == "-mm" && &map == &material().disp && count == 2) {
+      map.base = values[0];
+      map.gain = values[1];
+      return;
     }
     const bool is_neutral = option == "-mm" ? count == 2 && values[0] == 0 && values[1] == 1
                                             : std::all_of(values, values + count, [](float v) { return v == 0; });
@@ -238,8 +249,8 @@ class MtlReader {
       if (!is_zero) not_modelled(std::string(keyword_));
       return true;
     }
-    if (!is_one_of(key, {"map_ks", "map_ns", "disp", "map_disp", "decal", "refl", "map_refl", "map_ps", "map_pc",
-                         "map_rma", "map_orm", "map_aat"})) {
+    if (!is_one_of(key, {"map_ks", "map_ns", "decal", "refl", "map_refl", "map_ps", "map_pc", "map_rma", "map_orm",
+                         "map_aat"})) {
       return false;
     }
     not_modelled(std::string(keyword_));

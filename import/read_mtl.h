@@ -19,6 +19,7 @@ struct MtlMap {
   vec2 scale{1.0f}, offset{0.0f};  ///< -s and -o: uv * scale + offset, v up
   char channel = 0;                ///< -imfchan: r, g, b, m (alpha) or l (luminance); 0: not said
   float bump_scale = 1;            ///< -bm
+  float base = 0, gain = 1;        ///< -mm: base + gain * texel; read of disp
 
   explicit operator bool() const { return !file.empty(); }
 };
@@ -29,7 +30,7 @@ struct MtlMaterial {
   std::optional<vec3> kd, ks, ke;  ///< ke may exceed 1
   std::optional<float> ns, d, tr, pr, pm;
   std::optional<int> illum;
-  MtlMap map_kd, map_d, map_pr, map_pm, map_ke, norm, bump;
+  MtlMap map_kd, map_d, map_pr, map_pm, map_ke, norm, bump, disp;
   bool has_transmission_filter = false;   ///< Tf is not black
   std::vector<std::string> not_modelled;  ///< keywords and options that were read and have no effect, with their lines
 };

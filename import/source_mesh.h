@@ -13,6 +13,7 @@
 #include "base/surface_material.h"
 #include "base/vec.h"
 #include "farfield/material.h"
+#include "import/height_map.h"
 #include "import/subdivision_options.h"
 #include "import/texture.h"
 
@@ -30,6 +31,16 @@ struct SourceTexture {
 /// The other formats are mapped to glTF's model by their readers.
 using SourceMaterial = SurfaceMaterial<SourceTexture>;
 
+/// A displacement map: the surface lies (base + gain * value) above its faces, in the mesh's units.
+struct SourceHeights {
+  std::shared_ptr<const HeightMap> map;  ///< null: no displacement
+  std::string name;                      ///< of the image, for messages
+  Wrap wrap_u = Wrap::Repeat, wrap_v = Wrap::Repeat;
+  float gain = 1, base = 0;  ///< finite
+
+  explicit operator bool() const { return map != nullptr; }
+};
+
 struct SourceMesh {
   std::vector<dvec3> positions;
   std::vector<uint32_t> face_begin{0};    ///< face i has the corners face_begin[i] .. face_begin[i + 1] - 1
@@ -40,6 +51,7 @@ struct SourceMesh {
   std::vector<uint32_t> face_material;    ///< index into materials
   std::vector<uint32_t> face_number;      ///< empty, or of each face the number that the file's polygons give it
   std::vector<SourceMaterial> materials;
+  std::vector<SourceHeights> heights;    ///< empty, or one per material
   CageTags cage;                         ///< if the polygons are a subdivision cage: where it is sharp, and its rules
   bool is_split = false;                 ///< vertices are doubled where uv or normals differ, as glTF has them
   MaterialFunction material_function;    ///< a host's own; if set, `materials` give names and modes only

@@ -46,21 +46,36 @@ Result<Value> parse_in(const std::array<std::pair<Value, const char*>, N>& table
   return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is none of {}", text, names));
 }
 
+/// What displacement maps become of; empty if that is as usual.
+std::string displacement_text(const SubdivisionOptions& options) {
+  const SubdivisionOptions usual;
+  if (!options.displace) return " undisplaced";
+  return options.detail == usual.detail ? "" : fmt::format(" detail={}", options.detail);
+}
+
 /// All but the grid, which is the bake's.
 std::string text_without_grid(const SubdivisionOptions& options) {
+  const SubdivisionOptions usual;
+  const std::string displacement = displacement_text(options);
+  if (options.scheme == SubdivisionScheme::None) {
+    std::string cut;
+    if (options.error != usual.error) cut += fmt::format(" error={}", options.error);
+    if (options.edge != usual.edge) cut += fmt::format(" edge={}", options.edge);
+    const bool is_usual = cut.empty() && displacement.empty() && options.most_faces == usual.most_faces;
+    return is_usual ? "" : fmt::format("displace{}{} faces={}", cut, displacement, options.most_faces);
+  }
   std::string text =
       fmt::format("subdivide={}/{} error={}", name_of(options.scheme), kSubdivisionVersion, options.error);
   if (options.edge > 0) text += fmt::format(" edge={}", options.edge);
   if (options.boundary) text += fmt::format(" boundary={}", name_of(*options.boundary));
   if (options.uv) text += fmt::format(" uv_rule={}", name_of(*options.uv));
   if (options.most_faces != SubdivisionOptions{}.most_faces) text += fmt::format(" faces={}", options.most_faces);
-  return text;
+  return text + displacement;
 }
 
 }  // namespace
 
 Result<void> check_options(const SubdivisionOptions& options) {
-  if (options.scheme == SubdivisionScheme::None) return {};
   constexpr double kLeast = 1e-4;  // of either: rounding is not far below, and nothing would see it
   if (!(options.error >= kLeast) || !std::isfinite(options.error)) {
     return make_error(ErrorCode::InvalidArgument, fmt::format("the error of a subdivision must be at least {} and "
@@ -72,18 +87,22 @@ Result<void> check_options(const SubdivisionOptions& options) {
                                                               "{} and finite, not {}",
                                                               kLeast, options.edge));
   }
+  if (!(options.detail >= kLeast) || !std::isfinite(options.detail)) {
+    return make_error(ErrorCode::InvalidArgument, fmt::format("the detail of displacement maps must be at least {} "
+                                                              "and finite, not {}",
+                                                              kLeast, options.detail));
+  }
   return {};
 }
 
 std::string canonical_text(const SubdivisionOptions& options) {
-  if (options.scheme == SubdivisionScheme::None) return "";
-  return fmt::format("{} cage_grid={} ", text_without_grid(options), options.grid);
+  const std::string text = text_without_grid(options);
+  return text.empty() ? text : fmt::format("{} cage_grid={} ", text, options.grid);
 }
 
 uint64_t hash_of(const SubdivisionOptions& options) {
-  if (options.scheme == SubdivisionScheme::None) return 0;
   const std::string text = text_without_grid(options);
-  return hash_values(std::span<const char>(text));
+  return text.empty() ? 0 : hash_values(std::span<const char>(text));
 }
 
 const char* name_of(SubdivisionScheme scheme) { return name_in(kSchemes, scheme); }

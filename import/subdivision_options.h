@@ -13,7 +13,7 @@
 namespace farfield {
 
 enum class SubdivisionScheme : uint8_t {
-  None,          ///< the polygons are the surface
+  None,          ///< the polygons are the surface, but for what displacement maps make of it
   CatmullClark,  ///< any polygons; made for quads
   Loop,          ///< triangles only
 };
@@ -47,13 +47,16 @@ struct CageTags {
   bool empty() const { return crease_edges.empty() && sharp_vertices.empty() && holes.empty(); }
 };
 
-/// Lengths are in voxels of level 0, r_0: the longest side of the cage over `grid`.
+/// How cages and displaced faces are cut. Lengths are in voxels of level 0, r_0: the longest side of the cage over
+/// `grid`.
 struct SubdivisionOptions {
   SubdivisionScheme scheme = SubdivisionScheme::None;
   std::optional<CageBoundary> boundary{};  ///< none: the file's own, or EdgeAndCorner
   std::optional<CageUv> uv{};              ///< none: the file's own, or CornersPlus1
-  double error = 0.125;  ///< how far faces may lie from the limit surface, > 0: a pixel, seen eight times nearer
+  double error = 0.125;  ///< how far faces may lie from the surface, > 0: a pixel, seen eight times nearer
   double edge = 0;       ///< the longest that the sides of faces may be (diagonals are longer); 0: what `error` gives
+  bool displace = true;  ///< by the mesh's displacement maps
+  double detail = 1;     ///< heights are means over this much, and sides are cut no shorter for their sake; > 0
   uint32_t grid = 1024;  ///< set by the bake: twice its finest grid
   uint64_t most_faces = 10'000'000;  ///< beyond it `error` and `edge` grow, with a warning
 };
@@ -61,10 +64,10 @@ struct SubdivisionOptions {
 /// Errors: InvalidArgument, by the name of the flag.
 Result<void> check_options(const SubdivisionOptions& options);
 
-/// Equal texts mean equal faces from equal meshes. Empty without a scheme.
+/// Equal texts mean equal faces from equal meshes. Empty where all is as usual and there is no scheme.
 std::string canonical_text(const SubdivisionOptions& options);
 
-/// A number for what the options mean of a file, whatever grid it is baked to; 0 without a scheme.
+/// A number for what the options mean of a file, whatever grid it is baked to; 0 where all is as usual.
 uint64_t hash_of(const SubdivisionOptions& options);
 
 /// Names as flags have them. Errors: InvalidArgument, with the names that there are.

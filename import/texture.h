@@ -11,6 +11,7 @@
 
 #include "base/result.h"
 #include "base/vec.h"
+#include "import/height_map.h"
 
 namespace farfield {
 
@@ -57,6 +58,14 @@ Result<Texture> read_texture(const std::filesystem::path& path, TextureUse use);
 /// Reads an image file that lies in memory: PNG, JPEG, WebP or EXR. `name` is for messages. Errors: BadFile,
 /// Unsupported; Io as read_texture.
 Result<Texture> decode_texture(std::span<const unsigned char> bytes, const std::string& name, TextureUse use);
+
+/// The heights in a channel of an image file, as they are stored. channel: r, g, b, m (alpha; the first where there is
+/// none) or l (mean of r, g, b); anything else is r. Errors: those of read_texture and decode_texture.
+Result<HeightMap> read_heights(const std::filesystem::path& path, char channel);
+Result<HeightMap> decode_heights(std::span<const unsigned char> bytes, const std::string& name, char channel);
+
+/// A line that says what values of the map `name` were mended; empty if none were.
+std::string what_was_mended(const HeightMap& map, const std::string& name);
 
 /// The sRGB transfer function, [0, 1] to linear [0, 1].
 float srgb_to_linear(float value);

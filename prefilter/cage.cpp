@@ -18,8 +18,8 @@ namespace {
 
 constexpr size_t kMostCorners = std::numeric_limits<int>::max();  // of all faces together
 // Corners of a face, faces around a point: the limit surface of each such face is a sum over all of them, so that time
-// grows with their square. 2048 take minutes. (OpenSubdiv itself ends at 65535.)
-constexpr size_t kMostAround = 2048;
+// grows with their square. 2048 take minutes. Of polygons, which are not smoothed, OpenSubdiv's own limit.
+constexpr size_t kMostAroundSmoothed = 2048, kMostAround = 65535;
 
 bool is_usable(const dvec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
@@ -35,13 +35,13 @@ uint64_t hash_of_numbers(const Values& values, uint64_t seed) {
   return seed;
 }
 
-/// For each position the first that is the same; only itself unless the mesh doubles vertices.
-std::vector<uint32_t> join_doubles(const SourceMesh& mesh) {
+/// For each position the first that is the same; without `join` itself.
+std::vector<uint32_t> join_doubles(const SourceMesh& mesh, bool join) {
   std::vector<uint32_t> first(mesh.positions.size());
   std::unordered_multimap<uint64_t, uint32_t> by_hash;
   for (uint32_t v = 0; v < first.size(); ++v) {
     first[v] = v;
-    if (!mesh.is_split) continue;
+    if (!join) continue;
     const uint64_t hash = hash_of_numbers(mesh.positions[v], 0);
     const auto [begin, end] = by_hash.equal_range(hash);
     const auto same =
@@ -75,26 +75,28 @@ struct CageEdge {
 
 class CageBuilder {
  public:
-  CageBuilder(SourceMesh& mesh, const std::string& name, const Job& job) : mesh_(mesh), name_(name), job_(job) {}
+  CageBuilder(SourceMesh& mesh, CageUse use, const std::string& name, const Job& job)
+      : mesh_(mesh), is_smoothed_(use == CageUse::Smoothed), name_(name), job_(job) {}
 
   Result<Cage> build() {
     if (mesh_.corner_count() > kMostCorners) return unsupported("more than 2^31 corners of faces");
-    point_of_ = join_doubles(mesh_);
+    point_of_ = join_doubles(mesh_, mesh_.is_split || !is_smoothed_);
     for (uint32_t face = 0; face < mesh_.face_count(); ++face) {
       if (job_.is_cancelled()) return make_error(ErrorCode::Cancelled, "import: cancelled");
       add_face(face);
     }
     say_what_was_dropped();
     if (cage_.face_size.empty()) return make_error(ErrorCode::BadFile, fmt::format("{}: has no usable faces", name_));
-    if (largest_face_ > kMostAround) {
-      return unsupported(fmt::format("a face of {} corners; {} are the most of a cage", largest_face_, kMostAround));
+    if (largest_face_ > most_around()) {
+      return unsupported(fmt::format("a face of {} corners; {} are the most of a cage", largest_face_, most_around()));
     }
     find_edges();
     wind_alike();
     say_what_stays_sharp();
     drop_unused_points();
     FARFIELD_TRY(check_neighbours());
-    add_tags();
+    if (is_smoothed_) add_tags();
+    if (!is_smoothed_) add_normals();
     share(mesh_.corner_uv, cage_.uv);
     share(mesh_.corner_color, cage_.color);
     measure();
@@ -105,6 +107,8 @@ class CageBuilder {
   tl::unexpected<Error> unsupported(const std::string& what) const {
     return make_error(ErrorCode::Unsupported, fmt::format("{}: {}", name_, what));
   }
+
+  size_t most_around() const { return is_smoothed_ ? kMostAroundSmoothed : kMostAround; }
 
   void warn(size_t count, const char* what) {
     if (count > 0) mesh_.warnings.push_back(fmt::format("{} {}", count, what));
@@ -216,6 +220,7 @@ class CageBuilder {
       crowded += edge.count > 2;
       against += edge.winds_twice();
     }
+    if (!is_smoothed_) return;
     warn(crowded, "edges of the cage have more than two faces; the surface is sharp there");
     warn(against,
          "edges of the cage lie where it turns inside out, as a Moebius strip does; the surface is sharp there");
@@ -240,8 +245,8 @@ class CageBuilder {
     std::vector<uint32_t> count(cage_.points.size(), 0);
     for (const int point : cage_.corner_point) ++count[static_cast<size_t>(point)];
     const uint32_t most = *std::ranges::max_element(count);
-    if (most <= kMostAround) return {};
-    return unsupported(fmt::format("a point with {} faces; {} are the most of a cage", most, kMostAround));
+    if (most <= most_around()) return {};
+    return unsupported(fmt::format("a point with {} faces; {} are the most of a cage", most, most_around()));
   }
 
   /// The cage's number of a point of the mesh; -1: no face has it.
@@ -279,6 +284,30 @@ class CageBuilder {
 
   // ---- what lies at corners
 
+  /// Where the mesh has no normal, the face's own.
+  void add_normals() {
+    for (size_t face = 0; face < cage_.face_size.size(); ++face) {
+      const size_t begin = face_begin_[face], end = face_begin_[face + 1];
+      const dvec3 own = own_normal(begin, end);
+      for (size_t i = begin; i < end; ++i) {
+        const dvec3 given(mesh_.corner_normal.empty() ? vec3(0.0f) : mesh_.corner_normal[corner_[i]]);
+        const double length = glm::length(given);
+        cage_.corner_normal.push_back(length > 0 && std::isfinite(length) ? given / length : own);
+      }
+    }
+  }
+
+  /// Of a polygon that need not be plane; 0: it has no area.
+  dvec3 own_normal(size_t begin, size_t end) const {
+    const auto point = [&](size_t i) { return cage_.points[static_cast<size_t>(cage_.corner_point[i])]; };
+    dvec3 sum(0.0);
+    for (size_t i = begin + 1; i + 1 < end; ++i) {
+      sum += glm::cross(point(i) - point(begin), point(i + 1) - point(begin));
+    }
+    const double length = glm::length(sum);
+    return length > 0 ? sum / length : dvec3(0.0);
+  }
+
   /// A face with a value that is no number shares none: its neighbours would get it, too.
   template <int N, typename T>
   void share(const std::vector<glm::vec<N, T>>& corner, CageChannel<N>& channel) const {
@@ -314,6 +343,7 @@ class CageBuilder {
   }
 
   SourceMesh& mesh_;
+  bool is_smoothed_;
   const std::string& name_;
   const Job& job_;
   Cage cage_;
@@ -329,8 +359,8 @@ class CageBuilder {
 
 }  // namespace
 
-Result<Cage> make_cage(SourceMesh& mesh, const std::string& name, const Job& job) {
-  return CageBuilder(mesh, name, job).build();
+Result<Cage> make_cage(SourceMesh& mesh, CageUse use, const std::string& name, const Job& job) {
+  return CageBuilder(mesh, use, name, job).build();
 }
 
 }  // namespace farfield

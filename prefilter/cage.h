@@ -35,11 +35,18 @@ struct Cage {
   std::vector<float> point_sharpness;
   CageChannel<2> uv;  ///< NaN where the mesh has none
   CageChannel<4> color;
-  double side = 0;  ///< longest of the bounds
+  std::vector<dvec3> corner_normal;  ///< of polygons only: unit, per corner
+  double side = 0;                   ///< longest of the bounds
+};
+
+/// What a mesh is to be.
+enum class CageUse : uint8_t {
+  Smoothed,  ///< a cage in the proper sense
+  AsItIs,    ///< polygons, which are the surface: points at the same place are one, normals are kept
 };
 
 /// What is left out or mended is said in mesh.warnings, a line each. Errors: BadFile (nothing is left), Unsupported
 /// (more corners or neighbours of a point than OpenSubdiv takes), Cancelled.
-Result<Cage> make_cage(SourceMesh& mesh, const std::string& name, const Job& job = {});
+Result<Cage> make_cage(SourceMesh& mesh, CageUse use, const std::string& name, const Job& job = {});
 
 }  // namespace farfield

@@ -28,6 +28,18 @@ osd::Sdc::Options sdc_options(const LimitRules& rules) {
   return options;
 }
 
+osd::Sdc::SchemeType scheme_of(SubdivisionScheme scheme) {
+  switch (scheme) {
+    case SubdivisionScheme::None:
+      return osd::Sdc::SCHEME_BILINEAR;
+    case SubdivisionScheme::Loop:
+      return osd::Sdc::SCHEME_LOOP;
+    case SubdivisionScheme::CatmullClark:
+      break;
+  }
+  return osd::Sdc::SCHEME_CATMARK;
+}
+
 template <int N>
 void add_channel(const CageChannel<N>& channel, std::vector<Descriptor::FVarChannel>& out) {
   if (channel.corner_value.empty()) return;
@@ -106,9 +118,8 @@ std::unique_ptr<osd::Far::TopologyRefiner> make_refiner(const Cage& cage, const 
   descriptor.numFVarChannels = static_cast<int>(channels.size());
   descriptor.fvarChannels = channels.data();
   using Factory = osd::Far::TopologyRefinerFactory<Descriptor>;
-  const auto scheme = rules.scheme == SubdivisionScheme::Loop ? osd::Sdc::SCHEME_LOOP : osd::Sdc::SCHEME_CATMARK;
   std::unique_ptr<osd::Far::TopologyRefiner> refiner(
-      Factory::Create(descriptor, Factory::Options(scheme, sdc_options(rules))));
+      Factory::Create(descriptor, Factory::Options(scheme_of(rules.scheme), sdc_options(rules))));
   FARFIELD_CHECK(refiner != nullptr);  // make_cage() has taken out whatever it refuses
   return refiner;
 }

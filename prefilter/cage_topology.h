@@ -13,7 +13,8 @@ namespace farfield {
 
 /// How a cage is smoothed.
 struct LimitRules {
-  SubdivisionScheme scheme = SubdivisionScheme::CatmullClark;  ///< not None; of Loop, all faces are triangles
+  SubdivisionScheme scheme = SubdivisionScheme::CatmullClark;  ///< of Loop, all faces are triangles; None: they
+                                                               ///< are triangles and quads and stay as they are
   CageBoundary boundary = CageBoundary::EdgeAndCorner;
   CageUv uv = CageUv::CornersPlus1;
   CageCreasing creasing = CageCreasing::Uniform;

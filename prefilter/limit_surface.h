@@ -18,14 +18,17 @@
 
 namespace farfield {
 
-/// Of a cage of quads or, by Loop's rules, of triangles. Immutable once made, any number of threads may look at its
-/// faces. The cage must outlive it.
+/// Of a cage of quads or, by Loop's rules, of triangles. Without a scheme the faces (triangles and quads, these
+/// bilinear) with the normals of their corners. Immutable once made, any number of threads may look at its faces. The
+/// cage must outlive it.
 class LimitSurface {
  public:
   LimitSurface(const Cage& cage, const LimitRules& rules);
 
   const Cage& cage() const { return cage_; }
-  OpenSubdiv::Sdc::SchemeType scheme() const { return refiner_->GetSchemeType(); }
+  bool is_smoothed() const { return factory_ != nullptr; }
+  /// Of a face with this many corners.
+  OpenSubdiv::Bfr::Parameterization parameterization(int corner_count) const;
   /// The cage's faces, edges and points as neighbours of each other.
   OpenSubdiv::Far::TopologyLevel topology() const { return refiner_->GetLevel(0); }
   /// What several faces share is evaluated by the first of them that is there.
@@ -43,7 +46,8 @@ class LimitSurface {
 
   const Cage& cage_;
   std::unique_ptr<const OpenSubdiv::Far::TopologyRefiner> refiner_;
-  std::unique_ptr<const Factory> factory_;
+  std::unique_ptr<const Factory> factory_;  ///< null: without a scheme
+  std::vector<size_t> first_corner_;        ///< per face, where there is no factory
 };
 
 struct LimitPoint {
@@ -59,7 +63,8 @@ class FaceLimit {
 
   /// False: the face is a hole, or OpenSubdiv gives it no surface.
   bool move_to(int face);
-  OpenSubdiv::Bfr::Parameterization parameterization() const { return vertex_.GetParameterization(); }
+  OpenSubdiv::Bfr::Parameterization parameterization() const;
+  bool is_triangle() const { return parameterization().GetType() == OpenSubdiv::Bfr::Parameterization::TRI; }
 
   dvec3 position(const glm::dvec2& at) const;
   LimitPoint point(const glm::dvec2& at) const;
@@ -70,9 +75,12 @@ class FaceLimit {
   using Surface = OpenSubdiv::Bfr::Surface<double>;
 
   dvec3 normal(const glm::dvec2& at) const;
+  dvec3 mean_normal(const glm::dvec2& at) const;
   glm::dvec2 next_to(const glm::dvec2& at) const;
   template <typename Value>
   Value value(int channel, const glm::dvec2& at) const;
+  template <typename OfCorner>
+  auto mix(const glm::dvec2& at, const OfCorner& of_corner) const;
   template <int N>
   void prepare(const CageChannel<N>& channel);
 
@@ -80,6 +88,7 @@ class FaceLimit {
   Surface vertex_;
   Surface channel_[2];
   int channel_count_ = 0;
+  int face_ = 0, corner_count_ = 0;
   std::vector<double> points_, channel_points_[2];
 };
 

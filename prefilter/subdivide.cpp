@@ -18,14 +18,18 @@
 #include "base/index.h"
 #include "base/parallel.h"
 #include "prefilter/cage.h"
+#include "prefilter/displace.h"
+#include "prefilter/face_heights.h"
 #include "prefilter/limit_surface.h"
 #include "prefilter/tessellation_rates.h"
+#include "prefilter/triangulate.h"
 
 namespace farfield {
 namespace {
 
 namespace osd = OpenSubdiv;
 using glm::dvec2;
+
 using osd::Bfr::Tessellation;
 
 constexpr size_t kGrain = 16;  // faces of the cage at once
@@ -35,7 +39,7 @@ tl::unexpected<Error> cancelled() { return make_error(ErrorCode::Cancelled, "imp
 /// The pattern of a face.
 Tessellation pattern_of(const LimitSurface& surface, const TessellationRates& rates, int face) {
   const auto edges = surface.topology().GetFaceEdges(face);
-  const osd::Bfr::Parameterization parameters(surface.scheme(), edges.size());
+  const osd::Bfr::Parameterization parameters = surface.parameterization(edges.size());
   std::vector<int> all;
   for (int i = 0; i < edges.size(); ++i) all.push_back(rates.edge[static_cast<size_t>(edges[i])]);
   const auto& inside = rates.inside[static_cast<size_t>(face)];
@@ -89,9 +93,17 @@ Layout lay_out(const LimitSurface& surface, const TessellationRates& rates) {
 /// Writes the faces of the result, each into its own place.
 class Tessellator {
  public:
-  Tessellator(const LimitSurface& surface, const TessellationRates& rates, const Layout& layout,
-              const std::vector<uint32_t>& cage_material, SourceMesh& out)
-      : surface_(surface), rates_(rates), layout_(layout), cage_material_(cage_material), out_(out) {
+  /// heights: empty, or what is to be displaced; `detail` as detail_of() has it.
+  Tessellator(const LimitSurface& surface, const FaceHeights& heights, double detail, const TessellationRates& rates,
+              const Layout& layout, const std::vector<uint32_t>& cage_material, SourceMesh& out)
+      : surface_(surface),
+        heights_(heights),
+        detail_(detail),
+        rates_(rates),
+        layout_(layout),
+        cage_material_(cage_material),
+        out_(out) {
+    if (!heights.empty()) corner_height_.resize(layout.corner_count, 0.0f);
     out_.positions = surface.cage().points;  // those of holes alone stay; no face has them
     out_.positions.resize(layout.vertex_count);
     out_.corner_position.resize(layout.corner_count);
@@ -102,6 +114,9 @@ class Tessellator {
     out_.face_material.resize(layout.facet_count);
     out_.face_number.resize(layout.facet_count);
   }
+
+  /// One per corner of the result; empty if nothing is displaced.
+  const std::vector<float>& corner_height() const { return corner_height_; }
 
   /// How many faces have no surface although they are no holes.
   size_t run(const Job& job) {
@@ -133,12 +148,16 @@ class Tessellator {
     std::vector<vec3> normal;
     std::vector<vec2> uv;
     std::vector<vec4> color;
+    std::vector<float> height;
+    const SourceHeights* heights = heights_.of(face);
+    const float footprint = heights ? detail_of(*heights, limit, detail_).footprint : 1.0f;
     for (size_t i = 0; i < at.size(); ++i) {
       const LimitPoint point = limit.point(at[i]);
       if (is_own[i]) out_.positions[vertex[i]] = point.position;
       normal.emplace_back(point.normal);
       if (has_uv()) uv.emplace_back(limit.uv(at[i]));
       if (has_color()) color.emplace_back(limit.color(at[i]));
+      if (heights) height.push_back(static_cast<float>(height_at(*heights, limit.uv(at[i]), footprint)));
     }
 
     std::vector<int> facets(4 * static_cast<size_t>(pattern.GetNumFacets()));
@@ -152,6 +171,7 @@ class Tessellator {
       out_.corner_normal[corner] = normal[number];
       if (has_uv()) out_.corner_uv[corner] = uv[number];
       if (has_color()) out_.corner_color[corner] = color[number];
+      if (heights) corner_height_[corner] = height[number];
       ++corner;
     }
   }
@@ -186,13 +206,17 @@ class Tessellator {
   }
 
   const LimitSurface& surface_;
+  const FaceHeights& heights_;
+  double detail_;
   const TessellationRates& rates_;
   const Layout& layout_;
   const std::vector<uint32_t>& cage_material_;
   SourceMesh& out_;
+  std::vector<float> corner_height_;
 };
 
 struct Plan {
+  double detail = 0;
   TessellationRates rates;
   Layout layout;
 };
@@ -205,12 +229,14 @@ uint64_t cells_inside(const TessellationRates& rates) {
 }
 
 /// Rates that keep within the limits or, where that would be too many faces, as near as may be: said once.
-Result<Plan> plan_faces(const LimitSurface& surface, TessellationLimits limits, const SubdivisionOptions& options,
-                        const std::string& name, std::vector<std::string>& warnings, const Job& job) {
-  const double asked = limits.error;
+Result<Plan> plan_faces(const LimitSurface& surface, const FaceHeights& heights, TessellationLimits limits,
+                        const SubdivisionOptions& options, const std::string& name, std::vector<std::string>& warnings,
+                        const Job& job) {
+  const double asked = limits.error, asked_detail = limits.detail;
   while (true) {
     Plan plan;
-    plan.rates = find_rates(surface, limits, job);
+    plan.detail = limits.detail;
+    plan.rates = find_rates(surface, heights, limits, job);
     if (job.is_cancelled()) return cancelled();
     const auto most = std::min<uint64_t>(options.most_faces, UINT32_MAX / 4);  // corners have 32-bit numbers
     uint64_t count = cells_inside(plan.rates);
@@ -221,8 +247,12 @@ Result<Plan> plan_faces(const LimitSurface& surface, TessellationLimits limits, 
     if (count <= most) {
       if (limits.error > asked) {
         warnings.push_back(fmt::format(
-            "the cage's surface would take more than {} faces; they lie within {:.3g} voxels of it, not {:.3g}", most,
-            options.error * limits.error / asked, options.error));
+            "the {} surface would take more than {} faces; they lie within {:.3g} voxels of it, not {:.3g}{}",
+            heights.empty() ? "cage's" : "displaced", most, options.error * limits.error / asked, options.error,
+            heights.empty() ? ""
+                            : fmt::format(", and heights are means over {:.3g} voxels, not {:.3g}; a smaller "
+                                          "finest grid or larger --displace-detail says so on purpose",
+                                          options.detail * limits.detail / asked_detail, options.detail)));
       }
       return plan;
     }
@@ -237,6 +267,7 @@ Result<Plan> plan_faces(const LimitSurface& surface, TessellationLimits limits, 
     const double growth = 1.1 * static_cast<double>(count) / static_cast<double>(most);
     limits.error *= growth;
     limits.edge *= std::sqrt(growth);
+    limits.detail *= std::sqrt(growth);
   }
 }
 
@@ -270,26 +301,147 @@ bool are_all_quads(const Cage& cage) {
   return std::ranges::all_of(cage.face_size, [](int size) { return size == 4; });
 }
 
-Result<SourceMesh> subdivide_mesh(SourceMesh& mesh, const SubdivisionOptions& options, const std::string& name,
-                                  const Job& job) {
-  FARFIELD_TRY(check_options(options));
-  FARFIELD_TRY_LET(Cage given, make_cage(mesh, name, job));
-  FARFIELD_TRY(check_faces(given, options.scheme, name, mesh.warnings));
-  const LimitRules rules = rules_of(options, mesh.cage);
-  const bool is_fit = options.scheme == SubdivisionScheme::Loop || are_all_quads(given);
-  const Cage cage = is_fit ? std::move(given) : refine_to_quads(given, rules);
-  const LimitSurface surface(cage, rules);
-  const double voxel = cage.side / std::max(options.grid, 1u);
-  FARFIELD_TRY_LET(const Plan plan, plan_faces(surface, {options.error * voxel, options.edge * voxel}, options, name,
-                                               mesh.warnings, job));
+bool has_uv(const SourceMesh& mesh, uint32_t face) {
+  if (mesh.corner_uv.empty()) return false;
+  return std::all_of(mesh.corner_uv.begin() + mesh.face_begin[face], mesh.corner_uv.begin() + mesh.face_begin[face + 1],
+                     [](const vec2& uv) { return std::isfinite(uv.x) && std::isfinite(uv.y); });
+}
+
+double longest_side(const SourceMesh& mesh) {
+  dvec3 lower(INFINITY), upper(-INFINITY);
+  for (const uint32_t v : mesh.corner_position) {
+    lower = glm::min(lower, mesh.positions[v]);
+    upper = glm::max(upper, mesh.positions[v]);
+  }
+  const dvec3 size = upper - lower;
+  return std::max(size.x, std::max(size.y, size.z));
+}
+
+/// Maps that are given in another unit than the mesh: an error where nothing of it would be left, said where it is odd.
+Result<void> check_heights(const SourceHeights& heights, const std::string& material, double side,
+                           const std::string& name, std::vector<std::string>& warnings) {
+  constexpr double kAbsurd = 10, kOdd = 0.1;  // in sides: displacement is for small detail (thesis 6.1.5)
+  const double a = double{heights.base} + double{heights.gain} * heights.map->least();
+  const double b = double{heights.base} + double{heights.gain} * heights.map->most();
+  const std::string says =
+      fmt::format("material {}: displaced by {} to {:.4g} .. {:.4g}, where the mesh is {:.4g} across", material,
+                  heights.name, std::min(a, b), std::max(a, b), side);
+  const double highest = std::max(std::abs(a), std::abs(b));
+  if (!(highest <= kAbsurd * side)) {
+    return make_error(ErrorCode::BadFile, fmt::format("{}: {}; scale it (-bm or -mm of disp, height_gain), or bake "
+                                                      "with --no-displacement",
+                                                      name, says));
+  }
+  if (highest > kOdd * side) warnings.push_back(says);
+  return {};
+}
+
+/// Takes away the maps that displace nothing. Says what is not displaced although it has one.
+Result<void> keep_heights_that_count(SourceMesh& mesh, bool is_wanted, const std::string& name) {
+  if (!is_wanted) mesh.heights.clear();
+  if (mesh.heights.empty()) return {};
+  mesh.heights.resize(mesh.materials.size());
+  std::vector<size_t> lacking(mesh.heights.size(), 0), displaced(mesh.heights.size(), 0);
+  for (uint32_t face = 0; face < mesh.face_count(); ++face) {
+    const uint32_t material = mesh.face_material[face];
+    if (mesh.heights[material]) ++(has_uv(mesh, face) ? displaced : lacking)[material];
+  }
+  const double side = longest_side(mesh);
+  bool is_any = false;
+  for (size_t m = 0; m < mesh.heights.size(); ++m) {
+    if (lacking[m] > 0) {
+      mesh.warnings.push_back(fmt::format("material {}: {} faces have no texture coordinates for {}; not displaced",
+                                          mesh.materials[m].name, lacking[m], mesh.heights[m].name));
+    }
+    if (displaced[m] == 0) continue;
+    is_any = true;
+    FARFIELD_TRY(check_heights(mesh.heights[m], mesh.materials[m].name, side, name, mesh.warnings));
+  }
+  if (!is_any) mesh.heights.clear();
+  return {};
+}
+
+/// Whether the polygon is a quad that the parts of a bilinear patch fit into.
+bool is_convex_quad(std::span<const dvec3> p) {
+  if (p.size() != 4) return false;
+  const dvec3 n = glm::cross(p[2] - p[0], p[3] - p[1]);
+  for (size_t i = 0; i < 4; ++i) {
+    if (!(glm::dot(n, glm::cross(p[(i + 1) % 4] - p[i], p[(i + 2) % 4] - p[(i + 1) % 4])) > 0)) return false;
+  }
+  return true;
+}
+
+/// Cuts what is neither triangle nor convex quad into triangles. face_number keeps what they were.
+void cut_into_triangles_and_quads(SourceMesh& mesh) {
   SourceMesh out;
-  const size_t lost = Tessellator(surface, plan.rates, plan.layout, mesh.face_material, out).run(job);
+  std::vector<uint32_t> source_corner;
+  std::vector<dvec3> points;
+  for (uint32_t face = 0; face < mesh.face_count(); ++face) {
+    const uint32_t begin = mesh.face_begin[face], count = mesh.face_begin[face + 1] - begin;
+    points.clear();
+    for (uint32_t i = 0; i < count; ++i) points.push_back(mesh.positions[mesh.corner_position[begin + i]]);
+    const auto add = [&](std::span<const uint32_t> corners) {
+      for (const uint32_t corner : corners) source_corner.push_back(begin + corner);
+      out.face_begin.push_back(static_cast<uint32_t>(source_corner.size()));
+      out.face_material.push_back(mesh.face_material[face]);
+      out.face_number.push_back(mesh.face_number.empty() ? face : mesh.face_number[face]);
+    };
+    if (count == 3) {
+      add(std::array{0u, 1u, 2u});
+    } else if (is_convex_quad(points)) {
+      add(std::array{0u, 1u, 2u, 3u});
+    } else {
+      for (const uvec3& t : triangulate_polygon(points)) add(std::array{t.x, t.y, t.z});
+    }
+  }
+  const auto take = [&](auto& array) {
+    if (array.empty()) return;
+    auto all = std::exchange(array, {});
+    for (const uint32_t corner : source_corner) array.push_back(all[corner]);
+  };
+  take(mesh.corner_position);
+  take(mesh.corner_uv);
+  take(mesh.corner_color);
+  take(mesh.corner_normal);
+  mesh.face_begin = std::move(out.face_begin);
+  mesh.face_material = std::move(out.face_material);
+  mesh.face_number = std::move(out.face_number);
+}
+
+/// A cage that LimitSurface takes, by its rules.
+Result<Cage> cage_for(SourceMesh& mesh, const LimitRules& rules, const std::string& name, const Job& job) {
+  if (rules.scheme == SubdivisionScheme::None) {
+    cut_into_triangles_and_quads(mesh);
+    return make_cage(mesh, CageUse::AsItIs, name, job);
+  }
+  FARFIELD_TRY_LET(Cage given, make_cage(mesh, CageUse::Smoothed, name, job));
+  FARFIELD_TRY(check_faces(given, rules.scheme, name, mesh.warnings));
+  const bool is_fit = rules.scheme == SubdivisionScheme::Loop || are_all_quads(given);
+  return is_fit ? std::move(given) : refine_to_quads(given, rules);
+}
+
+Result<SourceMesh> tessellate(SourceMesh& mesh, const SubdivisionOptions& options, const std::string& name,
+                              const Job& job) {
+  const LimitRules rules = rules_of(options, mesh.cage);
+  FARFIELD_TRY_LET(const Cage cage, cage_for(mesh, rules, name, job));
+  const LimitSurface surface(cage, rules);
+  const FaceHeights heights(cage, mesh);
+  const double voxel = cage.side / std::max(options.grid, 1u);
+  const TessellationLimits limits{options.error * voxel, options.edge * voxel, options.detail * voxel};
+  FARFIELD_TRY_LET(const Plan plan, plan_faces(surface, heights, limits, options, name, mesh.warnings, job));
+  SourceMesh out;
+  Tessellator tessellator(surface, heights, plan.detail, plan.rates, plan.layout, mesh.face_material, out);
+  const size_t lost = tessellator.run(job);
   if (job.is_cancelled()) return cancelled();
   if (lost > 0) {  // not known to happen
     return make_error(ErrorCode::Unsupported,
                       fmt::format("{}: {} faces of the cage have no limit surface; bake it as it is", name, lost));
   }
   out.face_begin.back() = static_cast<uint32_t>(plan.layout.corner_count);
+  if (!heights.empty()) displace(out, tessellator.corner_height());
+  if (!mesh.face_number.empty()) {
+    for (uint32_t& face : out.face_number) face = mesh.face_number[face];
+  }
   out.materials = std::move(mesh.materials);
   out.material_function = std::move(mesh.material_function);
   out.material_batch = std::move(mesh.material_batch);
@@ -299,20 +451,26 @@ Result<SourceMesh> subdivide_mesh(SourceMesh& mesh, const SubdivisionOptions& op
   return out;
 }
 
-}  // namespace
-
-Result<SourceMesh> subdivide(SourceMesh mesh, const SubdivisionOptions& options, const std::string& name,
-                             const Job& job) {
-  if (options.scheme != SubdivisionScheme::None) {
-    return with_warnings(subdivide_mesh(mesh, options, name, job), mesh.warnings);
-  }
-  if (!mesh.cage.empty()) {
+Result<SourceMesh> subdivide_mesh(SourceMesh& mesh, const SubdivisionOptions& options, const std::string& name,
+                                  const Job& job) {
+  FARFIELD_TRY(check_options(options));
+  FARFIELD_TRY(keep_heights_that_count(mesh, options.displace, name));
+  const bool is_cage = options.scheme != SubdivisionScheme::None;
+  if (!is_cage && !mesh.cage.empty()) {
     mesh.warnings.push_back(
         fmt::format("it is tagged as a subdivision cage ({} creases, {} corners, {} holes) and read "
                     "as flat polygons; --subdivide catmull-clark or loop makes it smooth",
                     mesh.cage.crease_edges.size(), mesh.cage.sharp_vertices.size(), mesh.cage.holes.size()));
   }
-  return mesh;
+  if (!is_cage && mesh.heights.empty()) return std::move(mesh);
+  return tessellate(mesh, options, name, job);
+}
+
+}  // namespace
+
+Result<SourceMesh> subdivide(SourceMesh mesh, const SubdivisionOptions& options, const std::string& name,
+                             const Job& job) {
+  return with_warnings(subdivide_mesh(mesh, options, name, job), mesh.warnings);
 }
 
 }  // namespace farfield

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "prefilter/height_rates.h"
 
 namespace farfield {
 namespace {
@@ -82,14 +83,37 @@ struct RatesOfFace {
 /// The rates of one face after the other. One thread at a time.
 class FaceRates {
  public:
-  FaceRates(const LimitSurface& surface, const TessellationLimits& limits) : limit_(surface), limits_(limits) {}
+  FaceRates(const LimitSurface& surface, const FaceHeights& heights, const TessellationLimits& limits)
+      : is_smoothed_(surface.is_smoothed()), limit_(surface), heights_(heights), limits_(limits) {}
 
-  bool move_to(int face) { return limit_.move_to(face); }
+  bool move_to(int face) {
+    face_ = face;
+    return limit_.move_to(face);
+  }
+
+  RatesOfFace find() const {
+    RatesOfFace rates;
+    if (is_smoothed_) {
+      rates = find_smooth();
+    } else {
+      rates.edge.assign(static_cast<size_t>(limit_.parameterization().GetFaceSize()), 1);
+    }
+    if (const SourceHeights* heights = heights_.of(face_)) add_heights(*heights, rates);
+    return rates;
+  }
+
+ private:
+  /// Edges are cut as often as the inside: heights vary along them no less.
+  void add_heights(const SourceHeights& heights, RatesOfFace& rates) const {
+    const HeightDetail detail = detail_of(heights, limit_, limits_.detail);
+    rates.inside = rates_of_heights(heights, limit_, detail, kShareOfCurve * limits_.error, rates.inside);
+    for (size_t i = 0; i < rates.edge.size(); ++i) rates.edge[i] = std::max(rates.edge[i], rates.inside[i % 2]);
+  }
 
   /// Also of edges that are straight: inside the strip along an edge, whose other rim has the rates inside, faces reach
   /// as far along the edge as its parts do. So the edge has the rate of the strip's other rim at least, and enough for
   /// the strip's twist.
-  RatesOfFace find() const {
+  RatesOfFace find_smooth() const {
     const Parameterization parameters = limit_.parameterization();
     RatesOfFace rates;
     if (is_triangle()) {
@@ -105,8 +129,7 @@ class FaceRates {
     return rates;
   }
 
- private:
-  bool is_triangle() const { return limit_.parameterization().GetType() == Parameterization::TRI; }
+  bool is_triangle() const { return limit_.is_triangle(); }
 
   /// Of the curve beside an edge, `inset` of the way across the face.
   int along_edge(int edge, double inset) const {
@@ -168,13 +191,17 @@ class FaceRates {
     return kSide * kSide * most / (4 * kShareOfTwist * limits_.error);
   }
 
+  bool is_smoothed_;
+  int face_ = 0;
   FaceLimit limit_;
+  const FaceHeights& heights_;
   const TessellationLimits& limits_;
 };
 
 }  // namespace
 
-TessellationRates find_rates(const LimitSurface& surface, const TessellationLimits& limits, const Job& job) {
+TessellationRates find_rates(const LimitSurface& surface, const FaceHeights& heights, const TessellationLimits& limits,
+                             const Job& job) {
   const auto topology = surface.topology();
   TessellationRates rates;
   rates.edge.assign(static_cast<size_t>(topology.GetNumEdges()), 1);
@@ -182,7 +209,7 @@ TessellationRates find_rates(const LimitSurface& surface, const TessellationLimi
   std::vector<std::vector<int>> edge_of_face(rates.inside.size());
   constexpr size_t kGrain = 16;
   parallel_for(rates.inside.size(), kGrain, [&](size_t begin, size_t end) {
-    FaceRates face_rates(surface, limits);
+    FaceRates face_rates(surface, heights, limits);
     for (size_t face = begin; face < end && !job.is_cancelled(); ++face) {
       if (!face_rates.move_to(static_cast<int>(face))) continue;
       RatesOfFace found = face_rates.find();

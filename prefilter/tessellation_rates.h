@@ -7,14 +7,16 @@
 #include <vector>
 
 #include "base/job.h"
+#include "prefilter/face_heights.h"
 #include "prefilter/limit_surface.h"
 
 namespace farfield {
 
 /// What a tessellation may be off, in the cage's units.
 struct TessellationLimits {
-  double error = 0;  ///< farthest distance from the limit surface, > 0
-  double edge = 0;   ///< longest edge; 0: none
+  double error = 0;   ///< farthest distance from the limit surface, > 0
+  double edge = 0;    ///< longest edge; 0: none
+  double detail = 0;  ///< of displaced faces: what heights are means over, > 0
 };
 
 /// Edges have one rate, whichever of their faces looks: that is why there are no cracks.
@@ -26,8 +28,9 @@ struct TessellationRates {
 /// The most that an edge is cut into: a guard, reached by nothing that fits into memory.
 inline constexpr int kMostRate = 4096;
 
-/// The smallest rates (but for rounding) that keep within the limits. The same for any number of threads. After a
-/// cancel of no use.
-TessellationRates find_rates(const LimitSurface& surface, const TessellationLimits& limits, const Job& job = {});
+/// The smallest rates (but for rounding) that keep within the limits of the surface, with its heights. The same for any
+/// number of threads. After a cancel of no use.
+TessellationRates find_rates(const LimitSurface& surface, const FaceHeights& heights, const TessellationLimits& limits,
+                             const Job& job = {});
 
 }  // namespace farfield

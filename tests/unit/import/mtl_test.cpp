@@ -91,6 +91,39 @@ TEST(Mtl, HeightsBecomeANormalMapOnce) {
   EXPECT_EQ(all_warnings(mesh), "");
 }
 
+TEST(Mtl, HeightsOfDispAreInTheFilesUnits) {
+  const SourceMesh mesh = read_mtl_text("disp -mm -0.25 0.5 -bm 2 -clamp on -imfchan b halves.png\n");
+  EXPECT_EQ(all_warnings(mesh), "");
+  ASSERT_EQ(mesh.heights.size(), 1u);
+  const SourceHeights& heights = mesh.heights[0];
+  EXPECT_FLOAT_EQ(heights.base, -0.5f);
+  EXPECT_FLOAT_EQ(heights.gain, 1);
+  EXPECT_EQ(heights.wrap_u, Wrap::Clamp);
+  EXPECT_EQ(heights.map->at({0.1f, 0.5f}, 1, Wrap::Clamp, Wrap::Clamp), 0) << "blue is 0 on the left";
+  EXPECT_EQ(heights.map->at({0.9f, 0.5f}, 1, Wrap::Clamp, Wrap::Clamp), 1);
+  const SourceMesh plain = read_mtl_text("map_disp halves.png\n");
+  EXPECT_EQ(plain.heights.at(0).gain, 1);
+  EXPECT_EQ(plain.heights.at(0).base, 0);
+  EXPECT_EQ(plain.heights.at(0).wrap_u, Wrap::Repeat);
+}
+
+TEST(Mtl, AMapOfDispThatIsNotThereIsSaidAndOneThatIsChangesTheHash) {
+  const SourceMesh gone = read_mtl_text("disp gone.png\n");
+  EXPECT_NE(all_warnings(gone).find("gone.png"), std::string::npos);
+  EXPECT_NE(all_warnings(gone).find("the surface is not displaced"), std::string::npos);
+  EXPECT_TRUE(gone.heights.empty());
+  EXPECT_NE(read_mtl_text("disp halves.png\n").source_hash, read_mtl_text("disp mask_grey.png\n").source_hash);
+}
+
+TEST(Mtl, TheMapOfDispIsNotBumpAsWell) {
+  const SourceMesh both = read_mtl_text("map_Bump halves.png\ndisp halves.png\n");
+  EXPECT_FALSE(both.materials[0].normal_map);
+  EXPECT_NE(all_warnings(both).find("bump is the map of disp"), std::string::npos);
+  const SourceMesh apart = read_mtl_text("map_Bump mask_grey.png\ndisp halves.png\n");
+  EXPECT_TRUE(apart.materials[0].normal_map);
+  EXPECT_EQ(all_warnings(apart), "");
+}
+
 /// The normal of the plane z = a u + b v, in texels, everywhere but where the image is wrapped.
 TEST(DerivedMaps, NormalsOfAPlaneAreThePlanes) {
   const float a = 0.05f, b = -0.03f, scale = 3;
