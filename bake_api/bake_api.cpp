@@ -48,6 +48,7 @@ Result<SubdivisionOptions> subdivision_options(const BakeSubdivision& subdivisio
   if (subdivision.uv != BakeSubdivision::Uv::CornersPlus1) options.uv = static_cast<CageUv>(subdivision.uv);
   options.error = subdivision.error;
   options.edge = subdivision.edge;
+  options.detail = subdivision.detail;
   return options;
 }
 static_assert(static_cast<int>(BakeSubdivision::Scheme::Loop) == static_cast<int>(SubdivisionScheme::Loop));

@@ -55,13 +55,18 @@ std::string find_bad_field(const BakeMaterial& m) {
   if (!is_finite(m.emission) || min_component(m.emission) < 0) {
     return fmt::format("emission is ({}, {}, {}), not finite and >= 0", m.emission.x, m.emission.y, m.emission.z);
   }
-  if (!std::isfinite(m.normal_scale)) return fmt::format("normal_scale is {}", m.normal_scale);
+  for (const auto& [name, value] : {std::pair("normal_scale", m.normal_scale), std::pair("height_gain", m.height_gain),
+                                    std::pair("height_base", m.height_base)}) {
+    if (!std::isfinite(value)) return fmt::format("{} is {}", name, value);
+  }
   return {};
 }
 
 /// Images by file and use, and the name of the material at hand.
 class MaterialReader {
  public:
+  explicit MaterialReader(std::vector<std::string>& warnings) : warnings_(warnings) {}
+
   Result<SourceMaterial> read(const BakeMaterial& in, size_t index) {
     name_ = in.name.empty() ? fmt::format("material {}", index) : fmt::format("material {} ({})", index, in.name);
     if (const std::string bad = find_bad_field(in); !bad.empty()) return error(bad);
@@ -89,6 +94,21 @@ class MaterialReader {
     return out;
   }
 
+  /// Of the material that was read last.
+  Result<SourceHeights> read_heights(const BakeMaterial& in) {
+    const BakeTexture& texture = in.height_texture;
+    SourceHeights out;
+    if (!texture) return out;
+    FARFIELD_TRY(check_source(texture, "height_texture"));
+    FARFIELD_TRY_LET(out.map, texture.pixels.empty() ? heights_from_file(texture.file) : heights_from_pixels(texture));
+    out.name = texture.file.empty() ? "height_texture" : texture.file;
+    out.wrap_u = to_wrap(texture.wrap_u);
+    out.wrap_v = to_wrap(texture.wrap_v);
+    out.gain = in.height_gain;
+    out.base = in.height_base;
+    return out;
+  }
+
  private:
   tl::unexpected<Error> error(const std::string& what) const {
     return make_error(ErrorCode::InvalidArgument, name_ + ": " + what);
@@ -97,14 +117,25 @@ class MaterialReader {
   Result<SourceTexture> texture(const BakeTexture& in, TextureUse use, const char* field) {
     SourceTexture out{nullptr, to_wrap(in.wrap_u), to_wrap(in.wrap_v)};
     if (!in) return out;
-    if (!in.file.empty() && !in.pixels.empty()) {
-      return error(fmt::format("{} has a file and pixels; one of them", field));
-    }
+    FARFIELD_TRY(check_source(in, field));
     FARFIELD_TRY_LET(out.image, in.pixels.empty() ? from_file(in.file, use, field) : from_pixels(in, use, field));
     return out;
   }
 
+  /// That there is one source, and of pixels as many as it says.
+  Result<void> check_source(const BakeTexture& in, const char* field) const {
+    if (!in.file.empty() && !in.pixels.empty()) {
+      return error(fmt::format("{} has a file and pixels; one of them", field));
+    }
+    if (in.pixels.empty()) return {};
+    const bool has_size = in.width >= 1 && in.height >= 1 && in.width <= kLongestSide && in.height <= kLongestSide;
+    if (has_size && in.pixels.size() == static_cast<size_t>(in.width) * static_cast<size_t>(in.height)) return {};
+    return error(fmt::format("{} has {} pixels for {} x {}, each side in 1 to {}", field, in.pixels.size(), in.width,
+                             in.height, kLongestSide));
+  }
+
   using Image = std::shared_ptr<const Texture>;
+  using Heights = std::shared_ptr<const HeightMap>;
 
   Result<Image> from_file(const std::string& file, TextureUse use, const char* field) {
     Image& image = images_[{file, use}];
@@ -118,11 +149,6 @@ class MaterialReader {
   }
 
   Result<Image> from_pixels(const BakeTexture& in, TextureUse use, const char* field) const {
-    const bool has_size = in.width >= 1 && in.height >= 1 && in.width <= kLongestSide && in.height <= kLongestSide;
-    if (!has_size || in.pixels.size() != static_cast<size_t>(in.width) * static_cast<size_t>(in.height)) {
-      return error(fmt::format("{} has {} pixels for {} x {}, each side in 1 to {}", field, in.pixels.size(), in.width,
-                               in.height, kLongestSide));
-    }
     const bool has_alpha = use == TextureUse::ColorWithAlpha || use == TextureUse::Mask;
     std::vector<vec4> texels(in.pixels.size());
     for (size_t i = 0; i < texels.size(); ++i) {
@@ -136,20 +162,50 @@ class MaterialReader {
     return std::make_shared<const Texture>(in.width, in.height, texels);
   }
 
+  Result<Heights> heights_from_file(const std::string& file) {
+    Heights& heights = heights_[file];
+    if (heights) return heights;
+    auto read = farfield::read_heights(file, 'r');
+    if (!read) {
+      return make_error(read.error().code, fmt::format("{}: height_texture: {}", name_, read.error().message));
+    }
+    if (const std::string mended = what_was_mended(*read, file); !mended.empty()) warnings_.push_back(mended);
+    heights = std::make_shared<const HeightMap>(std::move(*read));
+    return heights;
+  }
+
+  Result<Heights> heights_from_pixels(const BakeTexture& in) const {
+    std::vector<float> values(in.pixels.size());
+    for (size_t i = 0; i < values.size(); ++i) {
+      values[i] = static_cast<float>(in.pixels.at(i, 0));
+      if (std::isfinite(values[i])) continue;
+      return error(fmt::format("height_texture: pixel ({}, {}) is not finite", i % static_cast<size_t>(in.width),
+                               i / static_cast<size_t>(in.width)));
+    }
+    return std::make_shared<const HeightMap>(in.width, in.height, std::move(values));
+  }
+
+  std::vector<std::string>& warnings_;
   std::string name_;
   std::map<std::pair<std::string, TextureUse>, Image> images_;
+  std::map<std::string, Heights> heights_;
 };
 
 }  // namespace
 
-Result<std::vector<SourceMaterial>> gather_materials(const BakeInput& input, size_t count) {
-  std::vector<SourceMaterial> out;
-  MaterialReader reader;
+Result<GatheredMaterials> gather_materials(const BakeInput& input, size_t count, std::vector<std::string>& warnings) {
+  GatheredMaterials out;
+  MaterialReader reader(warnings);
   for (size_t i = 0; i < input.materials.size(); ++i) {
     FARFIELD_TRY_LET(auto material, reader.read(input.materials[i], i));
-    out.push_back(std::move(material));
+    out.materials.push_back(std::move(material));
+    FARFIELD_TRY_LET(auto heights, reader.read_heights(input.materials[i]));
+    if (!heights) continue;
+    out.heights.resize(input.materials.size());
+    out.heights[i] = std::move(heights);
   }
-  if (out.size() < count) out.resize(count);
+  if (out.materials.size() < count) out.materials.resize(count);
+  if (!out.heights.empty()) out.heights.resize(out.materials.size());
   return out;
 }
 

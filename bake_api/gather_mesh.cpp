@@ -169,6 +169,9 @@ Result<void> check_mesh(const BakeMesh& mesh, const MeshName& name, const BakeIn
   FARFIELD_TRY(check_attribute(mesh.uv, mesh, name, "uv coordinates", job));
   FARFIELD_TRY(check_attribute(mesh.normals, mesh, name, "normals", job));
   FARFIELD_TRY(check_attribute(mesh.colors, mesh, name, "colors", job));
+  if (mesh.scheme && *mesh.scheme > BakeSubdivision::Scheme::Loop) {
+    return name.error("a subdivision scheme that does not exist");
+  }
   return check_creases(mesh, name, job);
 }
 
@@ -191,6 +194,8 @@ Result<void> check_instance(const BakeInstance& instance, size_t index, size_t m
 /// What the meshes have between them: an attribute that one lacks is filled up for it.
 struct Attributes {
   bool uv = false, normals = false, colors = false;
+  bool scheme = false;  ///< of its own
+  bool scale = false;   ///< by an instance
 };
 
 Attributes attributes_of(const std::vector<BakeMesh>& meshes) {
@@ -199,6 +204,7 @@ Attributes attributes_of(const std::vector<BakeMesh>& meshes) {
     has.uv |= !mesh.uv.values.empty();
     has.normals |= !mesh.normals.values.empty();
     has.colors |= !mesh.colors.values.empty();
+    has.scheme |= mesh.scheme.has_value();
   }
   return has;
 }
@@ -230,6 +236,14 @@ void append_creases(const BakeMesh& mesh, uint32_t first_position, CageTags& out
   }
 }
 
+/// By which heights of displacement grow with an instance.
+double scale_of(const glm::dmat4x3& to_asset) { return std::cbrt(std::abs(glm::determinant(glm::dmat3(to_asset)))); }
+
+std::optional<SubdivisionScheme> scheme_of(const BakeMesh& mesh) {
+  if (!mesh.scheme) return std::nullopt;
+  return static_cast<SubdivisionScheme>(*mesh.scheme);  // the same order, which bake_api.cpp asserts
+}
+
 /// Appends one instance of a checked mesh; a part of it after a cancel.
 void append(const BakeMesh& mesh, const glm::dmat4x3& to_asset, const Attributes& has, const Job& job,
             SourceMesh& out) {
@@ -242,6 +256,7 @@ void append(const BakeMesh& mesh, const glm::dmat4x3& to_asset, const Attributes
   const glm::dmat3 of_normals = glm::transpose(glm::inverse(linear));
   // A mirror image winds the other way; turned round, its faces agree with its normals again.
   const bool is_mirrored = glm::determinant(linear) < 0;
+  const double scale = scale_of(to_asset);
   size_t begin = 0;
   for (size_t face = 0; face < face_count(mesh) && !job.is_cancelled(); ++face) {
     const size_t count = mesh.counts.empty() ? 3 : static_cast<size_t>(mesh.counts.at(face));
@@ -260,6 +275,8 @@ void append(const BakeMesh& mesh, const glm::dmat4x3& to_asset, const Attributes
     begin += count;
     out.face_begin.push_back(static_cast<uint32_t>(out.corner_position.size()));
     out.face_material.push_back(mesh.materials.empty() ? 0 : static_cast<uint32_t>(mesh.materials.at(face)));
+    if (has.scheme) out.face_scheme.push_back(scheme_of(mesh));
+    if (has.scale) out.face_height_scale.push_back(static_cast<float>(scale));
   }
 }
 
@@ -299,7 +316,9 @@ Result<void> append_all(const BakeInput& input, const Job& job, SourceMesh& out)
   }
   out.positions.reserve(points);
   out.corner_position.reserve(corners);
-  const Attributes has = attributes_of(input.meshes);
+  Attributes has = attributes_of(input.meshes);
+  has.scale =
+      std::ranges::any_of(instances, [](const BakeInstance& instance) { return scale_of(instance.to_asset) != 1; });
   for (const BakeInstance& instance : instances) {
     append(input.meshes[instance.mesh], instance.to_asset, has, job, out);
     if (job.is_cancelled()) return cancelled();

@@ -65,6 +65,17 @@ void add_material(const SourceMaterial& m, TextureHashes& textures, ContentHash&
   for (const SourceTexture* map : m.maps()) hash.add(textures.of(*map));
 }
 
+void add_heights(const SourceHeights& heights, ContentHash& hash) {
+  hash.add(static_cast<bool>(heights));
+  if (!heights) return;
+  hash.add(heights.map->width());
+  hash.add(heights.map->values());
+  hash.add(heights.wrap_u);
+  hash.add(heights.wrap_v);
+  hash.add(heights.gain);
+  hash.add(heights.base);
+}
+
 MaterialFunction one_by_one(const MaterialBatchFunction& batch) {
   return [batch](const MaterialQuery& query) {
     MaterialSample sample;
@@ -94,6 +105,9 @@ uint64_t hash_of(const SourceMesh& mesh, const std::string& material_key) {
   hash.add(static_cast<bool>(mesh.material_function));
   hash.add(material_key);
   if (!mesh.cage.empty()) add_cage(mesh.cage, hash);
+  for (const auto& scheme : mesh.face_scheme) hash.add(scheme ? 1 + static_cast<int>(*scheme) : 0);
+  if (!mesh.heights.empty()) hash.add(mesh.face_height_scale);
+  for (const SourceHeights& heights : mesh.heights) add_heights(heights, hash);
   return hash.value();
 }
 
@@ -102,7 +116,11 @@ uint64_t hash_of(const SourceMesh& mesh, const std::string& material_key) {
 Result<SourceMesh> source_from_input(const BakeInput& input, const Job& job) {
   FARFIELD_TRY_LET(SourceMesh mesh, gather_mesh(input, job));
   const uint32_t highest = *std::max_element(mesh.face_material.begin(), mesh.face_material.end());
-  FARFIELD_TRY_LET(mesh.materials, with_warnings(gather_materials(input, size_t{highest} + 1), mesh.warnings));
+  FARFIELD_TRY_LET(auto looks,
+                   with_warnings(gather_materials(input, size_t{highest} + 1, mesh.warnings), mesh.warnings));
+  mesh.materials = std::move(looks.materials);
+  mesh.heights = std::move(looks.heights);
+  if (mesh.heights.empty()) mesh.face_height_scale.clear();
   if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, "bake: cancelled");
   mesh.material_batch = input.material_batch_function;
   mesh.material_function = mesh.material_batch ? one_by_one(mesh.material_batch) : input.material_function;

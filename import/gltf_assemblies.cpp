@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "import/gltf_assemblies.h"
+#include "import/gltf_mesh_extras.h"
 
 #include <fmt/format.h>
 
@@ -55,6 +56,9 @@ std::string looks_of(const GltfDocument& document, int accessor) {
 /// All of a mesh but its bytes.
 std::string looks_of(const GltfDocument& document, const tinygltf::Mesh& mesh, std::span<const int> material_as) {
   std::string looks = fmt::format("weights {}", fmt::join(mesh.weights, " "));
+  // A value that is none of the names is like nothing else: which mesh is refused must not depend on the others.
+  const auto scheme = scheme_of_extras(mesh);
+  looks += !scheme ? scheme.error().message : *scheme ? name_of(**scheme) : "";
   for (const auto& primitive : mesh.primitives) {
     const int material = primitive.material < 0 ? -1 : material_as[static_cast<size_t>(primitive.material)];
     looks += fmt::format("; {} {} {}", primitive.mode, material, looks_of(document, primitive.indices));

@@ -14,9 +14,11 @@
 #include "base/text.h"
 #include "import/gltf_assemblies.h"
 #include "import/gltf_document.h"
+#include "import/gltf_mesh_extras.h"
 #include "import/gltf_nodes.h"
 #include "import/gltf_volumes.h"
 #include "import/read_file.h"
+#include "import/read_source.h"
 #include "import/read_volume.h"
 
 namespace farfield {
@@ -382,7 +384,9 @@ class SceneReader {
         add_assembly(order[i], i, world);
       else if (node.mesh >= 0 && !hidden[number] && !assemblies_.is_part[number])
         FARFIELD_TRY(add_instances(node, order[i], i, world));
-      if (!hidden[number]) add_volume(order[i], i, world);
+      if (hidden[number]) continue;
+      add_volume(order[i], i, world);
+      add_model(order[i], i, world);
     }
     place_instances();
     for (uint32_t i = 0; i < order.size(); ++i) {
@@ -425,6 +429,37 @@ class SceneReader {
       mesh.bounds = {vec3(extent->lower), vec3(extent->upper)};
       mesh.volume = volume.file;
       mesh.fog = volume.fog;
+      scene_.meshes.push_back(std::move(mesh));
+      found = std::prev(scene_.meshes.end());
+    }
+    const auto asset = static_cast<uint32_t>(found - scene_.meshes.begin());
+    show(number, asset, index, worlds, {dmat4(1.0)}, {data_of_extras(node)});
+  }
+
+  /// The same of a mesh in a file of its own.
+  void add_model(int number, uint32_t index, const std::vector<dmat4>& worlds) {
+    const auto& node = model_.nodes[static_cast<size_t>(number)];
+    const auto named = mesh_of_extras(node);
+    const auto leave_out = [&](const std::string& why) {
+      warn(fmt::format("node {} ({}): its mesh is left out: {}", number, node.name, why));
+    };
+    if (!named) return leave_out(named.error().message);
+    if (!*named) return;
+    const auto is_same = [&](const GltfMesh& mesh) {
+      return mesh.model == (*named)->file && mesh.scheme == (*named)->scheme;
+    };
+    auto found = std::ranges::find_if(scene_.meshes, is_same);
+    if (found == scene_.meshes.end()) {
+      const auto source = read_source(folder_ / (*named)->file);
+      if (!source) return leave_out(source.error().message);
+      GltfMesh mesh;
+      mesh.name = node.name;
+      const std::string stem = std::filesystem::path((*named)->file).stem().string();
+      mesh.asset_name = unique_name(stem, fmt::format("mesh_of_node_{}", number));
+      for (const uint32_t v : source->corner_position) mesh.bounds.extend(vec3(source->positions[v]));
+      mesh.triangle_count = source->corner_count() - 2 * source->face_count();
+      mesh.model = (*named)->file;
+      mesh.scheme = (*named)->scheme;
       scene_.meshes.push_back(std::move(mesh));
       found = std::prev(scene_.meshes.end());
     }

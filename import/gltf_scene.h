@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "base/vec.h"
 #include "farfield/instance_data.h"
 #include "import/fog_options.h"
+#include "import/subdivision_options.h"
 
 namespace farfield {
 
@@ -26,15 +28,17 @@ const char* name_of(AssemblyRule rule);
 /// Errors: InvalidArgument, with the names that there are.
 Result<AssemblyRule> parse_assembly_rule(const std::string& name);
 
-/// What is baked as one asset: a mesh, an assembly of several, or a volume.
+/// What is baked as one asset: a mesh, an assembly of several, or a file that a node names: a volume or a mesh.
 struct GltfMesh {
   std::string name;        ///< as in the file, of an assembly its node's; may be empty or repeated
   std::string asset_name;  ///< unique in the file, fit for a file name: what its baked asset is called
   int32_t node = -1;       ///< of the file: an assembly of all that this node and those below show; -1: a mesh
   Box3 bounds;  ///< mesh space (the node's own), from the accessors' min and max (quantised ones decoded); may be empty
-  uint64_t triangle_count = 0;  ///< as the accessors promise it; 0 means that there is no mesh to bake
-  std::string volume;           ///< OpenVDB file, relative to the scene's folder; empty: no volume
-  FogOptions fog;               ///< of that file
+  uint64_t triangle_count = 0;              ///< as the accessors promise it; 0 means that there is no mesh to bake
+  std::string volume;                       ///< OpenVDB file, relative to the scene's folder; empty: no volume
+  FogOptions fog;                           ///< of that file
+  std::string model;                        ///< OBJ or PLY file, relative to the scene's folder; empty: none
+  std::optional<SubdivisionScheme> scheme;  ///< of that file; none: as the caller asks
 
   bool is_empty() const { return triangle_count == 0 && volume.empty(); }
 };
@@ -101,8 +105,8 @@ struct GltfScene {
   /// Subtracted from all that stands in the world, in double precision: map coordinates leave a float no digits. The
   /// middle of the scene if that lies far from 0 for its size, else 0.
   dvec3 origin_world{0.0};
-  /// All meshes of the file under their numbers, instanced or not, then assemblies, then volumes. Of equal ones only
-  /// the first is instanced.
+  /// All meshes of the file under their numbers, instanced or not, then assemblies, then files of nodes. Of equal ones
+  /// only the first is instanced.
   std::vector<GltfMesh> meshes;
   /// Of the default scene, in the order of a depth-first walk: all that are to be seen at some time, where they stand
   /// at time 0 or, if their transform is singular then (a plant that grows from nothing), as soon as it is not.

@@ -11,6 +11,7 @@
 #include "base/result.h"
 #include "import/corner_normals.h"
 #include "import/gltf_document.h"
+#include "import/gltf_mesh_extras.h"
 #include "import/gltf_nodes.h"
 #include "import/read_formats.h"
 
@@ -355,6 +356,9 @@ class GltfMeshReader {
     if (!mesh_.corner_normal.empty()) mesh_.corner_normal.resize(mesh_.corner_count(), vec3(0.0f));
     mesh_.source_files = document_.files_read();
     mesh_.is_split = true;
+    if (std::ranges::none_of(mesh_.face_scheme, [](const auto& scheme) { return scheme.has_value(); })) {
+      mesh_.face_scheme.clear();
+    }
     return std::move(mesh_);
   }
 
@@ -440,9 +444,12 @@ class GltfMeshReader {
 
   Result<void> add_mesh(int index, const glm::dmat4& to_world) {
     const auto& mesh = model_.meshes[static_cast<size_t>(index)];
+    const auto scheme = scheme_of_extras(mesh);
+    if (!scheme) return document_.bad(fmt::format("mesh {}: {}", index, scheme.error().message));
     for (size_t p = 0; p < mesh.primitives.size(); ++p) {
       const auto place = fmt::format("mesh {} primitive {}", index, p);
       if (auto done = add_primitive(mesh.primitives[p], mesh.weights, to_world, place); !done) return done;
+      mesh_.face_scheme.resize(mesh_.face_count(), *scheme);
     }
     return {};
   }

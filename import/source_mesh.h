@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,9 @@ struct SourceMesh {
   std::vector<uint32_t> face_number;      ///< empty, or of each face the number that the file's polygons give it
   std::vector<SourceMaterial> materials;
   std::vector<SourceHeights> heights;    ///< empty, or one per material
+  std::vector<float> face_height_scale;  ///< empty: 1; or per face: multiplies its heights, > 0
+  /// Empty, or per face: which cage it is part of; none: as the caller asks. Parts share no edges.
+  std::vector<std::optional<SubdivisionScheme>> face_scheme;
   CageTags cage;                         ///< if the polygons are a subdivision cage: where it is sharp, and its rules
   bool is_split = false;                 ///< vertices are doubled where uv or normals differ, as glTF has them
   MaterialFunction material_function;    ///< a host's own; if set, `materials` give names and modes only

@@ -60,9 +60,9 @@ void add_fog_flags(const FogOptions& fog, std::vector<std::string>& command) {
   if (fog.level_set) command.push_back("--level-set");
 }
 
-// The same of a cage: the flags of tools/subdivision_flags.h.
+// The same of cages and displacement: the flags of tools/subdivision_flags.h.
 void add_subdivision_flags(const SubdivisionOptions& subdivision, std::vector<std::string>& command) {
-  if (subdivision.scheme == SubdivisionScheme::None) return;
+  if (canonical_text(subdivision).empty()) return;
   const auto add = [&](const char* flag, const std::string& value) {
     command.push_back(flag);
     command.push_back(value);
@@ -70,6 +70,8 @@ void add_subdivision_flags(const SubdivisionOptions& subdivision, std::vector<st
   add("--subdivide", name_of(subdivision.scheme));
   add("--subdivide-error", fmt::format("{}", subdivision.error));
   add("--subdivide-edge", fmt::format("{}", subdivision.edge));
+  add("--displace-detail", fmt::format("{}", subdivision.detail));
+  if (!subdivision.displace) command.push_back("--no-displacement");
   if (subdivision.boundary) add("--subdivide-boundary", name_of(*subdivision.boundary));
   if (subdivision.uv) add("--subdivide-uv", name_of(*subdivision.uv));
 }

@@ -49,7 +49,8 @@ fs::path asset_folder(const SceneBakeOptions& options, const GltfMesh& mesh) {
 }
 
 fs::path asset_source(const SceneBakeOptions& options, const GltfMesh& mesh) {
-  return mesh.volume.empty() ? options.scene : options.scene.parent_path() / mesh.volume;
+  const std::string& own_file = mesh.volume.empty() ? mesh.model : mesh.volume;
+  return own_file.empty() ? options.scene : options.scene.parent_path() / own_file;
 }
 
 BakeOptions asset_bake_options(const SceneBakeOptions& options, const GltfScene& scene, size_t mesh,
@@ -62,9 +63,12 @@ BakeOptions asset_bake_options(const SceneBakeOptions& options, const GltfScene&
   bake.downsampling = options.downsampling;
   bake.import.fog = scene.meshes[mesh].fog;
   if (!scene.meshes[mesh].volume.empty()) return bake;
-  bake.import.node = scene.meshes[mesh].node;
-  if (bake.import.node < 0) bake.import.mesh = static_cast<int>(mesh);
   bake.import.subdivision = options.subdivision;
+  bake.import.subdivision.scheme = scene.meshes[mesh].scheme.value_or(options.subdivision.scheme);
+  if (scene.meshes[mesh].model.empty()) {
+    bake.import.node = scene.meshes[mesh].node;
+    if (bake.import.node < 0) bake.import.mesh = static_cast<int>(mesh);
+  }
   bake.import.known_hashes = &hashes;
   return bake;
 }

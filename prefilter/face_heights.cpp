@@ -39,6 +39,7 @@ FaceHeights::FaceHeights(const Cage& cage, const SourceMesh& mesh) {
     }
     const SourceHeights& heights = mesh.heights[mesh.face_material[cage.face[face]]];
     if (heights && has_uv) of_face_[face] = &heights;
+    if (!mesh.face_height_scale.empty()) scale_.push_back(mesh.face_height_scale[cage.face[face]]);
   }
 }
 

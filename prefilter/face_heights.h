@@ -18,10 +18,13 @@ class FaceHeights {
 
   /// Null: the face is not displaced, for lack of a map or of texture coordinates.
   const SourceHeights* of(int face) const { return of_face_.empty() ? nullptr : of_face_[static_cast<size_t>(face)]; }
+  /// Multiplies the heights of a face.
+  double scale(int face) const { return scale_.empty() ? 1.0 : scale_[static_cast<size_t>(face)]; }
   bool empty() const { return of_face_.empty(); }
 
  private:
   std::vector<const SourceHeights*> of_face_;  ///< empty: no face has one
+  std::vector<float> scale_;                   ///< empty: 1
 };
 
 /// A face against its map.

@@ -69,10 +69,10 @@ int side_of(double most) {
 }  // namespace
 
 std::array<int, 2> rates_of_heights(const SourceHeights& heights, const FaceLimit& limit, const HeightDetail& detail,
-                                    double error, std::array<int, 2> least) {
+                                    double scale, double error, std::array<int, 2> least) {
   if (detail.most.x <= least[0] && detail.most.y <= least[1]) return least;
   const auto height = [&](double u, double v) {
-    return static_cast<float>(height_at(heights, limit.uv({u, v}), detail.footprint));
+    return static_cast<float>(scale * height_at(heights, limit.uv({u, v}), detail.footprint));
   };
   HeightLines along[2] = {{side_of(detail.most.x), {}}, {side_of(detail.most.y), {}}};
   if (limit.is_triangle()) {  // lines along its three sides, all with the same samples

@@ -9,8 +9,9 @@
 namespace farfield {
 
 /// Rates along u and v (of triangles twice the same) of at least `least`, at which heights between neighbouring
-/// vertices lie within `error` of the chord, and slopes within a few degrees; no more than detail.most.
+/// vertices, `scale` times what the map says, lie within `error` of the chord, and slopes within a few degrees; no more
+/// than detail.most.
 std::array<int, 2> rates_of_heights(const SourceHeights& heights, const FaceLimit& limit, const HeightDetail& detail,
-                                    double error, std::array<int, 2> least);
+                                    double scale, double error, std::array<int, 2> least);
 
 }  // namespace farfield

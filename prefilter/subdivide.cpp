@@ -21,6 +21,7 @@
 #include "prefilter/displace.h"
 #include "prefilter/face_heights.h"
 #include "prefilter/limit_surface.h"
+#include "prefilter/scheme_parts.h"
 #include "prefilter/tessellation_rates.h"
 #include "prefilter/triangulate.h"
 
@@ -150,6 +151,7 @@ class Tessellator {
     std::vector<vec4> color;
     std::vector<float> height;
     const SourceHeights* heights = heights_.of(face);
+    const double scale = heights_.scale(face);
     const float footprint = heights ? detail_of(*heights, limit, detail_).footprint : 1.0f;
     for (size_t i = 0; i < at.size(); ++i) {
       const LimitPoint point = limit.point(at[i]);
@@ -157,7 +159,7 @@ class Tessellator {
       normal.emplace_back(point.normal);
       if (has_uv()) uv.emplace_back(limit.uv(at[i]));
       if (has_color()) color.emplace_back(limit.color(at[i]));
-      if (heights) height.push_back(static_cast<float>(height_at(*heights, limit.uv(at[i]), footprint)));
+      if (heights) height.push_back(static_cast<float>(scale * height_at(*heights, limit.uv(at[i]), footprint)));
     }
 
     std::vector<int> facets(4 * static_cast<size_t>(pattern.GetNumFacets()));
@@ -374,7 +376,7 @@ bool is_convex_quad(std::span<const dvec3> p) {
 /// Cuts what is neither triangle nor convex quad into triangles. face_number keeps what they were.
 void cut_into_triangles_and_quads(SourceMesh& mesh) {
   SourceMesh out;
-  std::vector<uint32_t> source_corner;
+  std::vector<uint32_t> source_corner, source_face;
   std::vector<dvec3> points;
   for (uint32_t face = 0; face < mesh.face_count(); ++face) {
     const uint32_t begin = mesh.face_begin[face], count = mesh.face_begin[face + 1] - begin;
@@ -384,6 +386,7 @@ void cut_into_triangles_and_quads(SourceMesh& mesh) {
       for (const uint32_t corner : corners) source_corner.push_back(begin + corner);
       out.face_begin.push_back(static_cast<uint32_t>(source_corner.size()));
       out.face_material.push_back(mesh.face_material[face]);
+      source_face.push_back(face);
       out.face_number.push_back(mesh.face_number.empty() ? face : mesh.face_number[face]);
     };
     if (count == 3) {
@@ -399,6 +402,10 @@ void cut_into_triangles_and_quads(SourceMesh& mesh) {
     auto all = std::exchange(array, {});
     for (const uint32_t corner : source_corner) array.push_back(all[corner]);
   };
+  if (!mesh.face_height_scale.empty()) {
+    auto all = std::exchange(mesh.face_height_scale, {});
+    for (const uint32_t face : source_face) mesh.face_height_scale.push_back(all[face]);
+  }
   take(mesh.corner_position);
   take(mesh.corner_uv);
   take(mesh.corner_color);
@@ -420,13 +427,22 @@ Result<Cage> cage_for(SourceMesh& mesh, const LimitRules& rules, const std::stri
   return is_fit ? std::move(given) : refine_to_quads(given, rules);
 }
 
-Result<SourceMesh> tessellate(SourceMesh& mesh, const SubdivisionOptions& options, const std::string& name,
+void keep_all_but_faces(SourceMesh& mesh, SourceMesh& out) {
+  out.materials = std::move(mesh.materials);
+  out.material_function = std::move(mesh.material_function);
+  out.material_batch = std::move(mesh.material_batch);
+  out.warnings.insert(out.warnings.begin(), mesh.warnings.begin(), mesh.warnings.end());
+  out.source_files = std::move(mesh.source_files);
+  out.source_hash = mesh.source_hash;
+}
+
+Result<SourceMesh> tessellate(SourceMesh& mesh, const SubdivisionOptions& options, double side, const std::string& name,
                               const Job& job) {
   const LimitRules rules = rules_of(options, mesh.cage);
   FARFIELD_TRY_LET(const Cage cage, cage_for(mesh, rules, name, job));
   const LimitSurface surface(cage, rules);
   const FaceHeights heights(cage, mesh);
-  const double voxel = cage.side / std::max(options.grid, 1u);
+  const double voxel = (side > 0 ? side : cage.side) / std::max(options.grid, 1u);
   const TessellationLimits limits{options.error * voxel, options.edge * voxel, options.detail * voxel};
   FARFIELD_TRY_LET(const Plan plan, plan_faces(surface, heights, limits, options, name, mesh.warnings, job));
   SourceMesh out;
@@ -442,19 +458,13 @@ Result<SourceMesh> tessellate(SourceMesh& mesh, const SubdivisionOptions& option
   if (!mesh.face_number.empty()) {
     for (uint32_t& face : out.face_number) face = mesh.face_number[face];
   }
-  out.materials = std::move(mesh.materials);
-  out.material_function = std::move(mesh.material_function);
-  out.material_batch = std::move(mesh.material_batch);
-  out.warnings = std::move(mesh.warnings);
-  out.source_files = std::move(mesh.source_files);
-  out.source_hash = mesh.source_hash;
+  keep_all_but_faces(mesh, out);
   return out;
 }
 
-Result<SourceMesh> subdivide_mesh(SourceMesh& mesh, const SubdivisionOptions& options, const std::string& name,
-                                  const Job& job) {
-  FARFIELD_TRY(check_options(options));
-  FARFIELD_TRY(keep_heights_that_count(mesh, options.displace, name));
+/// Faces of one scheme. side: of all that the voxels are a part of; 0: the mesh's own.
+Result<SourceMesh> subdivide_part(SourceMesh& mesh, const SubdivisionOptions& options, double side,
+                                  const std::string& name, const Job& job) {
   const bool is_cage = options.scheme != SubdivisionScheme::None;
   if (!is_cage && !mesh.cage.empty()) {
     mesh.warnings.push_back(
@@ -463,7 +473,42 @@ Result<SourceMesh> subdivide_mesh(SourceMesh& mesh, const SubdivisionOptions& op
                     mesh.cage.crease_edges.size(), mesh.cage.sharp_vertices.size(), mesh.cage.holes.size()));
   }
   if (!is_cage && mesh.heights.empty()) return std::move(mesh);
-  return tessellate(mesh, options, name, job);
+  return tessellate(mesh, options, side, name, job);
+}
+
+/// Faces of several schemes, each scheme's by itself.
+Result<SourceMesh> subdivide_by_scheme(SourceMesh& mesh, SubdivisionOptions options, const std::string& name,
+                                       const Job& job) {
+  const SubdivisionScheme usual = options.scheme;
+  const double side = longest_side(mesh);
+  SourceMesh out;
+  for (const auto scheme : {SubdivisionScheme::None, SubdivisionScheme::CatmullClark, SubdivisionScheme::Loop}) {
+    SourceMesh part = take_scheme(mesh, scheme, usual);
+    if (part.face_count() == 0) continue;
+    options.scheme = scheme;
+    FARFIELD_TRY_LET(const SourceMesh cut,
+                     with_warnings(subdivide_part(part, options, side, name, job), part.warnings));
+    if (out.corner_count() + cut.corner_count() > UINT32_MAX) {
+      return make_error(ErrorCode::Unsupported,
+                        fmt::format("{}: more than 2^32 corners of faces; bake it in parts", name));
+    }
+    append_part(cut, out);
+  }
+  keep_all_but_faces(mesh, out);
+  return out;
+}
+
+Result<SourceMesh> subdivide_mesh(SourceMesh& mesh, SubdivisionOptions options, const std::string& name,
+                                  const Job& job) {
+  FARFIELD_TRY(check_options(options));
+  FARFIELD_TRY(keep_heights_that_count(mesh, options.displace, name));
+  if (mesh.face_scheme.empty()) return subdivide_part(mesh, options, 0, name, job);
+  const auto scheme_of = [&](const auto& scheme) { return scheme.value_or(options.scheme); };
+  const SubdivisionScheme first = scheme_of(mesh.face_scheme[0]);
+  const auto is_first = [&](const auto& scheme) { return scheme_of(scheme) == first; };
+  if (!std::ranges::all_of(mesh.face_scheme, is_first)) return subdivide_by_scheme(mesh, options, name, job);
+  options.scheme = first;
+  return subdivide_part(mesh, options, 0, name, job);
 }
 
 }  // namespace

@@ -106,7 +106,8 @@ class FaceRates {
   /// Edges are cut as often as the inside: heights vary along them no less.
   void add_heights(const SourceHeights& heights, RatesOfFace& rates) const {
     const HeightDetail detail = detail_of(heights, limit_, limits_.detail);
-    rates.inside = rates_of_heights(heights, limit_, detail, kShareOfCurve * limits_.error, rates.inside);
+    rates.inside =
+        rates_of_heights(heights, limit_, detail, heights_.scale(face_), kShareOfCurve * limits_.error, rates.inside);
     for (size_t i = 0; i < rates.edge.size(); ++i) rates.edge[i] = std::max(rates.edge[i], rates.inside[i % 2]);
   }
 

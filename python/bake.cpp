@@ -44,6 +44,9 @@ BakeMesh to_mesh(const py::dict& fields, KeptArrays& arrays) {
   mesh.uv = to_attribute<2>(fields["uv"], arrays);
   mesh.normals = to_attribute<3>(fields["normals"], arrays);
   mesh.colors = to_attribute<4>(fields["colors"], arrays);
+  if (!fields["scheme"].is_none()) {
+    mesh.scheme = static_cast<BakeSubdivision::Scheme>(fields["scheme"].cast<uint8_t>());
+  }
   mesh.creases = to_rows<2, int64_t>(fields["creases"], arrays);
   mesh.crease_sharpness = to_rows<1, double>(fields["crease_sharpness"], arrays);
   mesh.sharp_points = to_rows<1, int64_t>(fields["sharp_points"], arrays);
@@ -96,6 +99,7 @@ BakeSubdivision to_subdivision(const py::dict& fields) {
   subdivision.uv = static_cast<BakeSubdivision::Uv>(fields["subdivide_uv"].cast<uint8_t>());
   subdivision.error = fields["subdivide_error"].cast<double>();
   subdivision.edge = fields["subdivide_edge"].cast<double>();
+  subdivision.detail = fields["displace_detail"].cast<double>();
   return subdivision;
 }
 

@@ -101,12 +101,12 @@ Fields<BakeMaterial> material_fields(KeptArrays& arrays) {
                       {"thin_transmission", field(&M::thin_transmission)},
                       {"emission", field(&M::emission)},
                       {"normal_scale", field(&M::normal_scale)},
+                      {"height_gain", field(&M::height_gain)},
+                      {"height_base", field(&M::height_base)},
                       {"alpha_mode", [](M& m, const py::handle& value) { m.alpha_mode = choose(value, kAlphaModes); }}};
-  const std::pair<const char*, BakeTexture M::*> textures[] = {{"base_color", &M::base_color_texture},
-                                                               {"roughness", &M::roughness_texture},
-                                                               {"alpha", &M::alpha_texture},
-                                                               {"normal", &M::normal_texture},
-                                                               {"emission", &M::emission_texture}};
+  const std::pair<const char*, BakeTexture M::*> textures[] = {
+      {"base_color", &M::base_color_texture}, {"roughness", &M::roughness_texture}, {"alpha", &M::alpha_texture},
+      {"normal", &M::normal_texture},         {"emission", &M::emission_texture},   {"height", &M::height_texture}};
   for (const auto& [name, texture] : textures) {
     fields[std::string(name) + "_texture"] = [texture, &arrays](M& m, const py::handle& value) {
       set_image(m.*texture, value, arrays);

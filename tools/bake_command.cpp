@@ -124,7 +124,7 @@ std::vector<std::string> flags_without_use(const BakeArguments& arguments) {
     const BakeOptions usual;
     const BakeOptions& options = arguments.options;
     if (options.finest_grid == usual.finest_grid && options.rays_per_voxel == usual.rays_per_voxel &&
-        options.import.subdivision.scheme == SubdivisionScheme::None && options.simplify == usual.simplify)
+        canonical_text(options.import.subdivision).empty() && options.simplify == usual.simplify)
       return {};
     return {fmt::format(
         "{}: --finest-grid, --rays-per-voxel, --subdivide and --simplify are for models; a volume's grid is its own",

@@ -20,13 +20,21 @@ inline void add_subdivision_flags(CLI::App* command, SubdivisionOptions& options
   CLI::Option* scheme =
       add_parsed_option(
           command, "--subdivide", options.scheme, parse_subdivision_scheme,
-          "Meshes are cages of smooth surfaces: catmull-clark, or loop (triangles only); none: as they are")
+          "Meshes are cages of smooth surfaces: catmull-clark, or loop (triangles only); none: as they are. Meshes "
+          "of glTF that say their own (extras \"farfield_subdivision\") are that")
           ->default_str("none");
   command
       ->add_option("--subdivide-error", options.error,
-                   "How far faces may lie from the smooth surface, in voxels of level 0 (half of level 1's)")
-      ->capture_default_str()
-      ->needs(scheme);
+                   "How far faces may lie from the smooth or displaced surface, in voxels of level 0 (half of level "
+                   "1's)")
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--displace-detail", options.detail,
+          "Displacement maps (disp of MTL) are means over this much, in such voxels, and cut no finer for their "
+          "sake")
+      ->capture_default_str();
+  command->add_flag("!--no-displacement", options.displace, "Displacement maps change nothing");
   command
       ->add_option("--subdivide-edge", options.edge,
                    "The longest that sides of faces may be, in such voxels; 0: as the error allows")

@@ -81,26 +81,10 @@ struct BakeAttribute {
   BakePer per = BakePer::Corner;
 };
 
-/// Polygons. All numbers must be finite. Winding does not matter: surfaces are two-sided.
-struct BakeMesh {
-  std::string name;       ///< for messages; may be empty
-  BakeRows<3> points;     ///< any unit; kept in double precision until they are relative to the asset's own origin
-  BakeRows<1> corners;    ///< face after face: the point of each corner, < points.size()
-  BakeRows<1> counts;     ///< corners of each face, >= 3; they add up to corners.size(). None: all faces are triangles
-  BakeRows<1> materials;  ///< each face's material id, below 2^16. None: 0. What ids mean: BakeInput
-  BakeAttribute<2> uv;    ///< texture coordinates; v points down the image: (0, 0) is its upper left corner
-  BakeAttribute<3> normals;  ///< for shading, any length; a normal of length 0 is the face's own
-  BakeAttribute<4> colors;   ///< linear RGBA; multiply the material's base colour and alpha
-  // Of a cage (BakeSubdivision) only:
-  BakeRows<2> creases;           ///< the two points of each edge that is to stay sharp; a face must have that edge
-  BakeRows<1> crease_sharpness;  ///< one for each: >= 0, 0 is smooth, 10 and more (also infinite) sharp for ever
-  BakeRows<1> sharp_points;      ///< points that are to stay sharp
-  BakeRows<1> point_sharpness;   ///< one for each, as of creases
-};
-
-/// Takes all meshes for cages of subdivision surfaces: level 0 is their limit surface, with its own normals. Texture
+/// Takes meshes for cages of subdivision surfaces: level 0 is their limit surface, with its own normals. Texture
 /// coordinates and colours are smoothed with it; the cage's normals are ignored. Faces keep the cage's numbers.
-/// [Catmull and Clark 1978] [Loop 1987], as OpenSubdiv has them.
+/// [Catmull and Clark 1978] [Loop 1987], as OpenSubdiv has them. `error` and `detail` are for displaced faces, too
+/// (BakeMaterial::height_texture), with or without a scheme.
 struct BakeSubdivision {
   enum class Scheme : uint8_t {
     None,          ///< the polygons are the surface
@@ -113,12 +97,31 @@ struct BakeSubdivision {
   };
   enum class Uv : uint8_t { None, CornersOnly, CornersPlus1, CornersPlus2, Boundaries, All };
 
-  Scheme scheme = Scheme::None;
+  Scheme scheme = Scheme::None;  ///< of meshes that do not say their own
   Boundary boundary = Boundary::EdgeAndCorner;
   Uv uv = Uv::CornersPlus1;  ///< where texture coordinates stay linear: OpenSubdiv's and USD's rules
-  double error = 0.125;      ///< how far faces may lie from the limit surface, > 0, in voxels of level 0 (half of
+  double error = 0.125;      ///< how far faces may lie from the surface, > 0, in voxels of level 0 (half of
                              ///< level 1's)
   double edge = 0;           ///< the longest that sides of faces may be, in such voxels; 0: what `error` gives
+  double detail = 1;         ///< in such voxels: heights of displacement are means over this much; > 0
+};
+
+/// Polygons. All numbers must be finite. Winding does not matter: surfaces are two-sided.
+struct BakeMesh {
+  std::string name;       ///< for messages; may be empty
+  BakeRows<3> points;     ///< any unit; kept in double precision until they are relative to the asset's own origin
+  BakeRows<1> corners;    ///< face after face: the point of each corner, < points.size()
+  BakeRows<1> counts;     ///< corners of each face, >= 3; they add up to corners.size(). None: all faces are triangles
+  BakeRows<1> materials;  ///< each face's material id, below 2^16. None: 0. What ids mean: BakeInput
+  BakeAttribute<2> uv;    ///< texture coordinates; v points down the image: (0, 0) is its upper left corner
+  BakeAttribute<3> normals;                       ///< for shading, any length; a normal of length 0 is the face's own
+  BakeAttribute<4> colors;                        ///< linear RGBA; multiply the material's base colour and alpha
+  std::optional<BakeSubdivision::Scheme> scheme;  ///< of this mesh; none: BakeSettings::subdivision has it
+  // Of a cage (BakeSubdivision) only:
+  BakeRows<2> creases;           ///< the two points of each edge that is to stay sharp; a face must have that edge
+  BakeRows<1> crease_sharpness;  ///< one for each: >= 0, 0 is smooth, 10 and more (also infinite) sharp for ever
+  BakeRows<1> sharp_points;      ///< points that are to stay sharp
+  BakeRows<1> point_sharpness;   ///< one for each, as of creases
 };
 
 /// A place of a mesh in the asset. The asset holds all of them as one thing.
@@ -166,6 +169,10 @@ struct BakeMaterial {
   BakeTexture alpha_texture;       ///< its alpha, or its first channel if it has none, multiplies alpha
   BakeTexture normal_texture;      ///< tangent space, +y up the image: (r, g, b) stands for 2 (r, g, b) - 1
   BakeTexture emission_texture;    ///< RGB multiplies emission
+  /// Displacement: the surface lies (height_base + height_gain * R) above the mesh, along its normals, in the mesh's
+  /// units (instances scale it). Files as stored, no sRGB; pixels of any finite value. Faces need uv.
+  BakeTexture height_texture;
+  float height_gain = 1, height_base = 0;  ///< finite
 };
 
 /// All that becomes one asset.
@@ -229,7 +236,7 @@ struct BakeSettings {
   uint32_t coarsest_grid = 8;     ///< the same of the last level, the root; <= finest_grid
   uint32_t rays_per_voxel = 200;  ///< that measure each voxel's occlusion, >= 1
   bool source_only = false;       ///< level 0 only: the source, ready to render
-  BakeSubdivision subdivision;    ///< of all meshes
+  BakeSubdivision subdivision;
   BakeSimplify simplify = BakeSimplify::Auto;
   BakeFog fog;  ///< of volumes alone; their grids are their own: finest_grid is not looked at
   BakeDownsampling downsampling = BakeDownsampling::Matched;

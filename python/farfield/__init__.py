@@ -62,7 +62,8 @@ class Mesh:
     a row per point or per corner; of shape (m, k, ..) they are per corner. material_ids: one per face; without them 0.
 
     Of a cage, which is baked with subdivide=...: creases (n, 2) are pairs of points whose edge stays sharp, sharp_points
-    (n,) points; their sharpness is a number or one each: 0 is smooth, 10 and more is sharp for ever.
+    (n,) points; their sharpness is a number or one each: 0 is smooth, 10 and more is sharp for ever. scheme:
+    "catmull-clark", "loop" or "none" for this mesh, whatever bake(subdivide=...) says of the others.
     """
 
     points: npt.ArrayLike
@@ -77,6 +78,7 @@ class Mesh:
     crease_sharpness: npt.ArrayLike | float = float("inf")
     sharp_points: npt.ArrayLike | None = None
     point_sharpness: npt.ArrayLike | float = float("inf")
+    scheme: str | None = None
 
     def _arrays(self) -> dict[str, Any]:
         points = _arrays.rows(self.points, 3, "points")
@@ -95,6 +97,7 @@ class Mesh:
             "uv": attribute("uv", 2),
             "normals": attribute("normals", 3),
             "colors": attribute("colors", 4),
+            "scheme": None if self.scheme is None else _number("scheme", self.scheme, _SCHEMES),
             **_arrays.creases(self.creases, self.crease_sharpness, self.sharp_points, self.point_sharpness),
         }
 
@@ -116,6 +119,7 @@ def bake(
     subdivide_edge: float = 0,
     subdivide_boundary: str = "edge-and-corner",
     subdivide_uv: str = "corners-plus1",
+    displace_detail: float = 1,
     simplify: str = "auto",
     threads: int = 0,
     memory_limit: int = 0,
@@ -127,14 +131,19 @@ def bake(
     instances: (index of a mesh, 4 x 4 or 3 x 4 matrix) for every place of a mesh; without them each is there once.
     materials: by material id, dictionaries with any of base_color, alpha, alpha_mode ("opaque", "mask", "blend"),
     alpha_cutoff, metallic, roughness, specular_f0, diffuse_transmission, diffuse_transmission_color,
-    thin_transmission, emission, normal_scale, name, and base_color_texture, roughness_texture (G roughness, B
-    metallic), alpha_texture, normal_texture, emission_texture: file names or arrays (height, width, 3 or 4), uint8
-    (colours: sRGB) or linear floats, each with base_color_wrap and so on: "repeat", "clamp", "mirror". Or an (n, 3)
+    thin_transmission, emission, normal_scale, height_gain, height_base, name, and base_color_texture, roughness_texture (G roughness, B
+    metallic), alpha_texture, normal_texture, emission_texture, height_texture: file names or arrays (height, width, 3 or 4; of
+    one channel (height, width)), uint8 (colours: sRGB) or linear floats, each with base_color_wrap and so on: "repeat", "clamp", "mirror". Or an (n, 3)
     array of base colours. Or a function of a MaterialQuery that returns a dictionary with any of diffuse, specular,
     roughness, transmission, opacity, normal, emission: called from several threads in turn, some 15 microseconds each,
     dozens of times per face (see `batched`); the same query must get the same answer. material_key stands for its answers: without one, every call bakes anew.
 
-    subdivide: "catmull-clark" or "loop" (triangles only) takes all meshes for cages: level 0 is their limit surface.
+    height_texture displaces: the surface lies height_base + height_gain * value above the mesh, along its normals, in
+    the mesh's units; heights of arrays may be any finite floats. displace_detail: they are means over this much, in
+    voxels of level 0, and faces are cut until they lie within subdivide_error of them.
+
+    subdivide: "catmull-clark" or "loop" (triangles only) takes meshes that say nothing else (Mesh.scheme) for cages: level
+    0 is their limit surface.
     subdivide_error: how far its faces may lie from it, in voxels of level 0. subdivide_edge: the longest that their sides
     may be, in such voxels; 0 is what the error gives. subdivide_boundary: "edge-and-corner" or "edge-only".
     subdivide_uv: where texture coordinates stay linear: "none", "corners-only", "corners-plus1", "corners-plus2",
@@ -154,7 +163,7 @@ def bake(
         except ValueError as unfit:
             raise ValueError(f"mesh {i}{f' ({mesh.name})' if mesh.name else ''}: {unfit}") from None
     settings = _settings(coarsest_grid, source_only, threads, memory_limit, finest_grid, rays_per_voxel)
-    settings |= _subdivision(subdivide, subdivide_error, subdivide_edge, subdivide_boundary, subdivide_uv)
+    settings |= _subdivision(subdivide, subdivide_error, subdivide_edge, subdivide_boundary, subdivide_uv, displace_detail)
     settings |= _simplify(simplify)
     placed = _arrays.instances(instances, len(all_meshes))
     looks = _arrays.materials(materials)
@@ -182,6 +191,7 @@ def bake_file(
     subdivide_edge: float = 0,
     subdivide_boundary: str = "edge-and-corner",
     subdivide_uv: str = "corners-plus1",
+    displace_detail: float = 1,
     simplify: str = "auto",
     threads: int = 0,
     memory_limit: int = 0,
@@ -192,7 +202,7 @@ def bake_file(
     fog volume), level_set (take one for the fog inside it), and what bake_volume() has; their grids are their own."""
     settings = _settings(coarsest_grid, source_only, threads, memory_limit, finest_grid, rays_per_voxel)
     settings |= _fog(density_scale, albedo, anisotropy, downsampling, density_grid, level_set, fibre_roughness)
-    settings |= _subdivision(subdivide, subdivide_error, subdivide_edge, subdivide_boundary, subdivide_uv)
+    settings |= _subdivision(subdivide, subdivide_error, subdivide_edge, subdivide_boundary, subdivide_uv, displace_detail)
     settings |= _simplify(simplify)
     return _farfield.bake_file(os.fspath(source), os.fspath(out), mesh, settings, progress)
 
@@ -308,7 +318,7 @@ def _simplify(method: str = "auto") -> dict[str, Any]:
 
 def _subdivision(
     scheme: str = "none", error: float = 0.125, edge: float = 0, boundary: str = "edge-and-corner",
-    uv: str = "corners-plus1"
+    uv: str = "corners-plus1", detail: float = 1
 ) -> dict[str, Any]:
     return {
         "subdivide": _number("subdivide", scheme, _SCHEMES),
@@ -316,6 +326,7 @@ def _subdivision(
         "subdivide_uv": _number("subdivide_uv", uv, _UV_RULES),
         "subdivide_error": error,
         "subdivide_edge": edge,
+        "displace_detail": detail,
     }
 
 

@@ -579,5 +579,65 @@ TEST(Subdivide, HearsACancel) {
   EXPECT_EQ(mesh.error().code, ErrorCode::Cancelled);
 }
 
+// ---- several schemes in one mesh
+
+/// A cube and, 4 to its right, another one.
+SourceMesh two_cubes(std::optional<SubdivisionScheme> first, std::optional<SubdivisionScheme> second) {
+  SourceMesh mesh = cube_cage(), other = cube_cage();
+  for (const dvec3& p : other.positions) mesh.positions.push_back(p + dvec3(4, 0, 0));
+  for (const uint32_t v : other.corner_position) mesh.corner_position.push_back(8 + v);
+  for (int face = 0; face < 6; ++face) {
+    mesh.face_begin.push_back(mesh.face_begin.back() + 4);
+    mesh.face_material.push_back(0);
+  }
+  mesh.face_scheme.assign(6, first);
+  mesh.face_scheme.resize(12, second);
+  return mesh;
+}
+
+TEST(Subdivide, EachFaceFollowsItsOwnScheme) {
+  const SourceMesh mesh =
+      refined(two_cubes(SubdivisionScheme::None, SubdivisionScheme::CatmullClark), SubdivisionOptions{});
+  size_t flat = 0;
+  for (size_t face = 0; face < mesh.face_count(); ++face) {
+    const bool is_left = corner(mesh, mesh.face_begin[face]).x < 2;
+    flat += is_left;
+    EXPECT_EQ(is_left, mesh.face_number[face] < 6);
+    if (is_left) continue;
+    for (uint32_t i = mesh.face_begin[face]; i < mesh.face_begin[face + 1]; ++i) {
+      EXPECT_LT(glm::length(corner(mesh, i) - dvec3(4, 0, 0)), 0.95) << "a round cube";
+    }
+  }
+  EXPECT_EQ(flat, 6u);
+  expect_watertight(mesh);
+}
+
+TEST(Subdivide, WithoutOneOfTheirOwnFacesFollowTheCallers) {
+  SubdivisionOptions options = catmull_clark();
+  options.scheme = SubdivisionScheme::None;
+  const SourceMesh said = refined(two_cubes(SubdivisionScheme::CatmullClark, SubdivisionScheme::CatmullClark), options);
+  options.scheme = SubdivisionScheme::CatmullClark;
+  const SourceMesh asked = refined(two_cubes(std::nullopt, std::nullopt), options);
+  EXPECT_EQ(said.positions, asked.positions);
+  EXPECT_EQ(said.corner_normal, asked.corner_normal);
+  const SourceMesh mixed = refined(two_cubes(SubdivisionScheme::None, std::nullopt), options);
+  EXPECT_LT(mixed.face_count(), asked.face_count());
+}
+
+TEST(Subdivide, TagsStayWithTheFacesOfTheirScheme) {
+  SourceMesh mesh = two_cubes(SubdivisionScheme::None, SubdivisionScheme::CatmullClark);
+  for (uint32_t v : {8u, 9u, 10u, 11u}) {
+    mesh.cage.crease_edges.emplace_back(v, v == 11 ? 8 : v + 1);
+    mesh.cage.crease_sharpness.push_back(kInfiniteSharpness);
+    mesh.cage.sharp_vertices.push_back(v);
+    mesh.cage.vertex_sharpness.push_back(kInfiniteSharpness);
+  }
+  mesh.cage.holes = {7};  // above, of the right cube
+  const SourceMesh out = refined(mesh, SubdivisionOptions{});
+  EXPECT_TRUE(out.warnings.empty());
+  EXPECT_LT(distance_to_nearest(out, {3, -1, -1}), 1e-12) << "a sharp corner stays";
+  EXPECT_TRUE(std::ranges::none_of(out.face_number, [](uint32_t face) { return face == 7; }));
+}
+
 }  // namespace
 }  // namespace farfield
