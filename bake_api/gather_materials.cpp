@@ -193,9 +193,9 @@ class MaterialReader {
 
 }  // namespace
 
-Result<GatheredMaterials> gather_materials(const BakeInput& input, size_t count, std::vector<std::string>& warnings) {
+Result<GatheredMaterials> gather_materials(const BakeInput& input, size_t count) {
   GatheredMaterials out;
-  MaterialReader reader(warnings);
+  MaterialReader reader(out.warnings);
   for (size_t i = 0; i < input.materials.size(); ++i) {
     FARFIELD_TRY_LET(auto material, reader.read(input.materials[i], i));
     out.materials.push_back(std::move(material));

@@ -116,10 +116,10 @@ uint64_t hash_of(const SourceMesh& mesh, const std::string& material_key) {
 Result<SourceMesh> source_from_input(const BakeInput& input, const Job& job) {
   FARFIELD_TRY_LET(SourceMesh mesh, gather_mesh(input, job));
   const uint32_t highest = *std::max_element(mesh.face_material.begin(), mesh.face_material.end());
-  FARFIELD_TRY_LET(auto looks,
-                   with_warnings(gather_materials(input, size_t{highest} + 1, mesh.warnings), mesh.warnings));
+  FARFIELD_TRY_LET(auto looks, with_warnings(gather_materials(input, size_t{highest} + 1), mesh.warnings));
   mesh.materials = std::move(looks.materials);
   mesh.heights = std::move(looks.heights);
+  mesh.warnings.insert(mesh.warnings.end(), looks.warnings.begin(), looks.warnings.end());
   if (mesh.heights.empty()) mesh.face_height_scale.clear();
   if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, "bake: cancelled");
   mesh.material_batch = input.material_batch_function;

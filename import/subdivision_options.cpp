@@ -46,31 +46,25 @@ Result<Value> parse_in(const std::array<std::pair<Value, const char*>, N>& table
   return make_error(ErrorCode::InvalidArgument, fmt::format("\"{}\" is none of {}", text, names));
 }
 
-/// What displacement maps become of; empty if that is as usual.
-std::string displacement_text(const SubdivisionOptions& options) {
+bool is_usual(const SubdivisionOptions& options) {
   const SubdivisionOptions usual;
-  if (!options.displace) return " undisplaced";
-  return options.detail == usual.detail ? "" : fmt::format(" detail={}", options.detail);
+  return options.scheme == usual.scheme && options.error == usual.error && options.edge == usual.edge &&
+         options.boundary == usual.boundary && options.uv == usual.uv && options.displace == usual.displace &&
+         options.detail == usual.detail && options.most_faces == usual.most_faces;
 }
 
 /// All but the grid, which is the bake's.
 std::string text_without_grid(const SubdivisionOptions& options) {
-  const SubdivisionOptions usual;
-  const std::string displacement = displacement_text(options);
-  if (options.scheme == SubdivisionScheme::None) {
-    std::string cut;
-    if (options.error != usual.error) cut += fmt::format(" error={}", options.error);
-    if (options.edge != usual.edge) cut += fmt::format(" edge={}", options.edge);
-    const bool is_usual = cut.empty() && displacement.empty() && options.most_faces == usual.most_faces;
-    return is_usual ? "" : fmt::format("displace{}{} faces={}", cut, displacement, options.most_faces);
-  }
+  if (is_usual(options)) return "";
   std::string text =
       fmt::format("subdivide={}/{} error={}", name_of(options.scheme), kSubdivisionVersion, options.error);
   if (options.edge > 0) text += fmt::format(" edge={}", options.edge);
   if (options.boundary) text += fmt::format(" boundary={}", name_of(*options.boundary));
   if (options.uv) text += fmt::format(" uv_rule={}", name_of(*options.uv));
   if (options.most_faces != SubdivisionOptions{}.most_faces) text += fmt::format(" faces={}", options.most_faces);
-  return text + displacement;
+  if (!options.displace) text += " undisplaced";
+  if (options.detail != SubdivisionOptions{}.detail) text += fmt::format(" detail={}", options.detail);
+  return text;
 }
 
 }  // namespace

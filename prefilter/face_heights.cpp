@@ -47,6 +47,7 @@ HeightDetail detail_of(const SourceHeights& heights, const FaceLimit& limit, dou
   constexpr int kParts = 8;
   const dvec2 size(heights.map->width(), heights.map->height());
   HeightDetail out;
+  out.detail = detail;
   for_each_line(limit, [&](int direction, const auto& curve) {
     double length = 0, texels = 0;
     dvec3 p = limit.position(curve(0.0));

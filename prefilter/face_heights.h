@@ -29,9 +29,10 @@ class FaceHeights {
 
 /// A face against its map.
 struct HeightDetail {
+  double detail = 0;       ///< a length: what heights are means over
   glm::dvec2 length{0.0};  ///< along u and v, at most; of triangles the longest side, twice
   glm::dvec2 texels{0.0};  ///< the same in texels of the map
-  float footprint = 1;     ///< in texels: what heights are means over
+  float footprint = 1;     ///< the detail in texels
   glm::dvec2 most{1.0};    ///< cutting into more parts than this shows nothing more
 };
 

@@ -12,9 +12,9 @@
 namespace farfield {
 namespace {
 
-// Farthest from the chord by its length: slopes then differ by less than four times that, 5 degrees, which is as much
-// as shading shows.
-constexpr double kMostBow = 0.02;
+// Parts shorter than so many details may be off by so much less: a bow of the whole error within one detail is a slope,
+// which shading shows, though no outline does. At the usual error and detail slopes then differ by less than 5 degrees.
+constexpr double kDetailsOfFullError = 2;
 constexpr int kFewestSamples = 4, kMostSamples = 4096;  // along a side
 
 /// Heights on lines of samples, of one direction.
@@ -46,11 +46,11 @@ double farthest_from_chords(const std::vector<float>& line, double part) {
   return most;
 }
 
-int find_rate(const HeightLines& all, double length, double most, double error, int least) {
+int find_rate(const HeightLines& all, double length, double most, double detail, double error, int least) {
   const int limit = std::max(least, static_cast<int>(std::min<double>(most, kMostRate)));
   int rate = least;
   while (rate < limit) {
-    const double allowed = std::min(error, kMostBow * length / rate);
+    const double allowed = error * std::min(1.0, length / rate / (kDetailsOfFullError * detail));
     double off = 0;
     for (const auto& line : all.lines)
       off = std::max(off, farthest_from_chords(line, static_cast<double>(all.side) / rate));
@@ -92,7 +92,7 @@ std::array<int, 2> rates_of_heights(const SourceHeights& heights, const FaceLimi
       }
       for (auto* line : {&u, &v, &across}) along[0].lines.push_back(std::move(*line));
     }
-    const int rate = find_rate(along[0], detail.length.x, detail.most.x, error, least[0]);
+    const int rate = find_rate(along[0], detail.length.x, detail.most.x, detail.detail, error, least[0]);
     return {rate, rate};
   }
   const int columns = along[0].side, rows = along[1].side;
@@ -105,8 +105,8 @@ std::array<int, 2> rates_of_heights(const SourceHeights& heights, const FaceLimi
       along[1].lines[static_cast<size_t>(x)].push_back(value);
     }
   }
-  return {find_rate(along[0], detail.length.x, detail.most.x, error, least[0]),
-          find_rate(along[1], detail.length.y, detail.most.y, error, least[1])};
+  return {find_rate(along[0], detail.length.x, detail.most.x, detail.detail, error, least[0]),
+          find_rate(along[1], detail.length.y, detail.most.y, detail.detail, error, least[1])};
 }
 
 }  // namespace farfield

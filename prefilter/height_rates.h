@@ -9,8 +9,8 @@
 namespace farfield {
 
 /// Rates along u and v (of triangles twice the same) of at least `least`, at which heights between neighbouring
-/// vertices, `scale` times what the map says, lie within `error` of the chord, and slopes within a few degrees; no more
-/// than detail.most.
+/// vertices, `scale` times what the map says, lie within `error` of the chord, and within less where parts are about as
+/// short as the detail, so that slopes show; no more than detail.most.
 std::array<int, 2> rates_of_heights(const SourceHeights& heights, const FaceLimit& limit, const HeightDetail& detail,
                                     double scale, double error, std::array<int, 2> least);
 

@@ -24,7 +24,8 @@ int QuadMesh::edge_corner(uint32_t face, uint32_t a, uint32_t b) const {
 
 uint32_t QuadMesh::beyond(uint32_t face, uint32_t a, uint32_t b) const {
   uint32_t found = kNoIndex;
-  for (const uint32_t other : star(a)) {
+  // Around the one with fewer faces: those at a pole of thousands ask for each other's neighbours.
+  for (const uint32_t other : star(star(b).size() < star(a).size() ? b : a)) {
     if (other == face || edge_corner(other, a, b) < 0) continue;
     if (found != kNoIndex) return kNotManifold;
     found = other;

@@ -85,6 +85,33 @@ class Bake(InAFolder):
         with self.assertRaisesRegex(farfield.Error, "crease 0 lies between points 0 and 7"):
             triangles(farfield.Mesh(corners, faces, creases=[[0, 7]]))
 
+    def test_displaces(self):
+        uv = [[0, 0], [1, 0], [1, 1], [0, 1]]
+        plane = farfield.Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]], uv=uv)
+        heights = np.sin(np.linspace(0, 4 * np.pi, 64, dtype=np.float32))[:, np.newaxis] * np.ones((1, 64), np.float32)
+
+        def triangles(**fields):
+            with tempfile.TemporaryDirectory() as folder:
+                made = farfield.bake(plane, os.path.join(folder, "a.farfield"), materials=[fields], source_only=True, **SMALL)
+                return made["levels"][0]["triangles"]
+
+        self.assertEqual(triangles(), 2)
+        self.assertEqual(triangles(height_texture=heights, height_gain=0.0, height_base=0.05), 2)
+        self.assertGreater(triangles(height_texture=heights, height_gain=0.05), 20)
+        heights[3, 5] = np.inf
+        with self.assertRaisesRegex(farfield.Error, r"height_texture: pixel \(5, 3\) is not finite"):
+            triangles(height_texture=heights)
+
+    def test_a_mesh_may_have_its_own_scheme(self):
+        points = [[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+        faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+        with tempfile.TemporaryDirectory() as folder:
+            made = farfield.bake(farfield.Mesh(points, faces, scheme="catmull-clark"), os.path.join(folder, "a.farfield"),
+                                 source_only=True, **SMALL)
+            self.assertGreater(made["levels"][0]["triangles"], 100)
+        with self.assertRaisesRegex(ValueError, "scheme is 'catmark'"):
+            farfield.bake(farfield.Mesh(points, faces, scheme="catmark"), "unused")
+
     def test_takes_faces_in_every_form(self):
         flat = farfield.Mesh(self.points, self.quads.ravel(), counts=[4] * 16)
         lists = farfield.Mesh(self.points.tolist(), self.quads.tolist())

@@ -12,6 +12,7 @@
 #include "cache/manifest.h"
 #include "farfield/bake.h"
 #include "prefilter/condition.h"
+#include "prefilter/subdivide.h"
 #include "tests/support/files.h"
 #include "tests/support/png_files.h"
 
@@ -389,6 +390,84 @@ TEST(BakeApiCage, RefusesSubdivisionsThatMakeNoSense) {
   settings.subdivision.error = -1;
   EXPECT_EQ(code_of(bake_meshes(cube.input(false), out, settings)), ErrorCode::InvalidArgument);
   EXPECT_FALSE(fs::exists(out));
+}
+
+TEST(BakeApiCage, AMeshMayHaveASchemeOfItsOwn) {
+  const Cube cube;
+  const test::TemporaryFolder folder;
+  const std::string out = (folder.path() / "cube.farfield").string();
+  BakeSettings settings;
+  settings.finest_grid = 32;
+  settings.source_only = true;
+  BakeInput input = cube.input(false);
+  input.meshes.push_back(input.meshes[0]);
+  glm::dmat4x3 beside(1.0);
+  beside[3] = glm::dvec3(4, 0, 0);
+  input.instances = {{0, glm::dmat4x3(1.0)}, {1, beside}};
+  const auto triangles = [&] {
+    const auto baked = bake_meshes(input, out, settings);
+    EXPECT_TRUE(baked) << baked.error().message;
+    EXPECT_FALSE(baked->is_up_to_date) << "schemes are part of the input";
+    return baked->levels[0].triangles;
+  };
+  const auto flat = triangles();
+  EXPECT_EQ(flat, 24u);
+  input.meshes[1].scheme = BakeSubdivision::Scheme::CatmullClark;
+  const auto one = triangles();
+  EXPECT_GT(one, 200u);
+  settings.subdivision.scheme = BakeSubdivision::Scheme::CatmullClark;
+  const auto both = triangles();
+  EXPECT_EQ(both, 2 * (one - 12));
+  input.meshes[0].scheme = BakeSubdivision::Scheme::None;
+  EXPECT_EQ(triangles(), one);
+  input.meshes[0].scheme = static_cast<BakeSubdivision::Scheme>(5);
+  EXPECT_EQ(code_of(bake_meshes(input, out, settings)), ErrorCode::InvalidArgument);
+}
+
+/// A quad in z = 0, [0, 1]^2, raised by 0.1, once as it is and once three times as large.
+TEST(BakeApiDisplacement, HeightsGrowWithInstancesAndAreKeptInTheHash) {
+  const std::vector<glm::vec3> points = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  const std::vector<uint32_t> corners = {0, 1, 2, 3};
+  const std::vector<uint32_t> counts = {4};
+  const std::vector<glm::vec2> uv = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  const std::vector<glm::vec4> pixels = {{0.4f, 0, 0, 1}};
+  BakeMesh mesh;
+  mesh.points = points;
+  mesh.corners = corners;
+  mesh.counts = counts;
+  mesh.uv.values = uv;
+  BakeMaterial material;
+  material.height_texture.pixels = pixels;
+  material.height_texture.width = material.height_texture.height = 1;
+  material.height_gain = 0.5f;
+  material.height_base = -0.1f;
+  BakeInput input;
+  input.meshes = {mesh};
+  input.materials = {material};
+  glm::dmat4x3 large(3.0);
+  large[3] = glm::dvec3(2, 0, 0);
+  input.instances = {{0, glm::dmat4x3(1.0)}, {0, large}};
+  const SourceMesh source = source_from_input(input).value();
+  const SourceMesh moved = subdivide(source, SubdivisionOptions{}, "quads").value();
+  for (const uint32_t v : moved.corner_position) {
+    const auto& p = moved.positions[v];
+    EXPECT_NEAR(p.z, p.x > 1.5 ? 0.3 : 0.1, 1e-6) << p.x;
+  }
+  const uint64_t before = source.source_hash;
+  input.materials[0].height_gain = 0.6f;
+  EXPECT_NE(source_from_input(input)->source_hash, before);
+  input.materials[0].height_gain = 0.5f;
+  EXPECT_EQ(source_from_input(input)->source_hash, before);
+
+  const test::TemporaryFolder folder;
+  BakeSettings settings;
+  settings.finest_grid = 32;
+  settings.source_only = true;
+  const auto baked = bake_meshes(input, (folder.path() / "quads.farfield").string(), settings);
+  ASSERT_TRUE(baked) << baked.error().message;
+  settings.subdivision.detail = -1;
+  EXPECT_EQ(code_of(bake_meshes(input, (folder.path() / "quads.farfield").string(), settings)),
+            ErrorCode::InvalidArgument);
 }
 
 }  // namespace

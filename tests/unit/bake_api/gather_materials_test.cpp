@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include <limits>
 
 #include "tests/support/files.h"
@@ -27,14 +29,14 @@ std::string error_of(const BakeMaterial& material, ErrorCode code = ErrorCode::I
 TEST(GatherMaterials, FillsUpToTheIdsThatFacesCarry) {
   BakeMaterial red;
   red.base_color = {1, 0, 0};
-  const auto materials = gather_materials(with(red), 3).value();
+  const auto materials = gather_materials(with(red), 3).value().materials;
   ASSERT_EQ(materials.size(), 3u);
   EXPECT_EQ(materials[0].base_color, vec3(1, 0, 0));
   EXPECT_EQ(materials[2].base_color, vec3(0.8f));  // a face without any material
 }
 
 TEST(GatherMaterials, ABakesDefaultIsTheReadersDefault) {
-  const SourceMaterial ours = gather_materials(with({}), 1).value()[0], theirs;
+  const SourceMaterial ours = gather_materials(with({}), 1).value().materials[0], theirs;
   EXPECT_EQ(ours.base_color, theirs.base_color);
   EXPECT_EQ(ours.dielectric_f0, theirs.dielectric_f0);
   EXPECT_EQ(ours.roughness, theirs.roughness);
@@ -62,7 +64,7 @@ TEST(GatherMaterials, PixelsAndTheFileThatHoldsThemAreTheSameTexture) {
     const auto of_memory = gather_materials(with(a), 1), of_disk = gather_materials(with(b), 1);
     ASSERT_TRUE(of_disk) << of_disk.error().message;
     for (auto map : {&SourceMaterial::base_color_map, &SourceMaterial::alpha_map, &SourceMaterial::normal_map}) {
-      const SourceTexture &one = (*of_memory)[0].*map, &other = (*of_disk)[0].*map;
+      const SourceTexture &one = of_memory->materials[0].*map, &other = of_disk->materials[0].*map;
       ASSERT_EQ(static_cast<bool>(one), static_cast<bool>(other));
       if (!one) continue;
       for (int x = 0; x < 2; ++x)
@@ -77,7 +79,7 @@ TEST(GatherMaterials, AnOpaqueMaterialIgnoresItsImagesAlpha) {
   material.base_color_texture.pixels = pixels;
   material.base_color_texture.width = material.base_color_texture.height = 1;
   material.base_color_texture.wrap_v = BakeTexture::Wrap::Mirror;
-  const SourceTexture map = gather_materials(with(material), 1).value()[0].base_color_map;
+  const SourceTexture map = gather_materials(with(material), 1).value().materials[0].base_color_map;
   EXPECT_NEAR(map.image->mean().y, 0.5f, 1e-4f);
   EXPECT_EQ(map.image->mean().w, 1.0f);
   EXPECT_EQ(map.wrap_u, Wrap::Repeat);
@@ -90,7 +92,7 @@ TEST(GatherMaterials, ReadsAFileOnce) {
   material.base_color_texture.file = folder.write("dot.png", test::png(1, 1, {{9, 9, 9, 255}}));
   BakeInput input;
   input.materials = {material, material};
-  const auto materials = gather_materials(input, 2).value();
+  const auto materials = gather_materials(input, 2).value().materials;
   EXPECT_EQ(materials[0].base_color_map.image, materials[1].base_color_map.image);
 }
 
@@ -126,6 +128,50 @@ TEST(GatherMaterials, NamesTheTextureThatIsWrong) {
   wrong.normal_texture.width = 1;
   wrong.normal_texture.height = 2;
   EXPECT_NE(error_of(wrong).find("normal_texture: pixel (0, 1) is not in [0, 1]"), std::string::npos);
+}
+
+TEST(GatherMaterials, HeightsArePixelsOfAnySizeOrAFileAsStored) {
+  const test::TemporaryFolder folder;
+  const std::vector<vec4> pixels = {{-3, 0, 0, 1}, {20, 0, 0, 1}};
+  BakeMaterial plain, in_memory, on_disk;
+  in_memory.height_texture.pixels = pixels;
+  in_memory.height_texture.width = 2;
+  in_memory.height_texture.height = 1;
+  in_memory.height_texture.wrap_u = BakeTexture::Wrap::Clamp;
+  in_memory.height_gain = 0.5f;
+  in_memory.height_base = -1;
+  on_disk.height_texture.file = folder.write("grey.png", test::png(1, 1, {{51, 51, 51, 255}}));
+  BakeInput input;
+  input.materials = {plain, in_memory, on_disk};
+  const auto gathered = gather_materials(input, 4).value();
+  ASSERT_EQ(gathered.heights.size(), 4u);
+  EXPECT_FALSE(gathered.heights[0]);
+  EXPECT_EQ(gathered.heights[1].map->least(), -3);
+  EXPECT_EQ(gathered.heights[1].map->most(), 20);
+  EXPECT_EQ(gathered.heights[1].wrap_u, Wrap::Clamp);
+  EXPECT_EQ(gathered.heights[1].gain, 0.5f);
+  EXPECT_EQ(gathered.heights[1].base, -1);
+  EXPECT_NEAR(gathered.heights[2].map->most(), 0.2f, 1e-6f) << "no sRGB";
+  EXPECT_FALSE(gathered.heights[3]);
+  EXPECT_TRUE(gather_materials(with(plain), 1).value().heights.empty());
+}
+
+TEST(GatherMaterials, HeightsThatAreWrongAreNamed) {
+  const std::vector<vec4> pixels = {{0, 0, 0, 1}, {NAN, 0, 0, 1}};
+  BakeMaterial wrong;
+  wrong.name = "bark";
+  wrong.height_texture.pixels = pixels;
+  wrong.height_texture.width = 2;
+  wrong.height_texture.height = 1;
+  EXPECT_EQ(error_of(wrong), "material 0 (bark): height_texture: pixel (1, 0) is not finite");
+  wrong.height_texture.width = 0;
+  EXPECT_NE(error_of(wrong).find("height_texture has 2 pixels for 0 x 1"), std::string::npos);
+  wrong.height_texture = {};
+  wrong.height_texture.file = "/gone.exr";
+  EXPECT_NE(error_of(wrong, ErrorCode::NotFound).find("height_texture: /gone.exr"), std::string::npos);
+  wrong = {};
+  wrong.height_gain = INFINITY;
+  EXPECT_EQ(error_of(wrong), "material 0: height_gain is inf");
 }
 
 }  // namespace

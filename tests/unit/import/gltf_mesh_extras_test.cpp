@@ -55,7 +55,7 @@ TEST(GltfMeshExtras, EqualTrianglesOfDifferentSchemesAreDifferentAssets) {
 
 TEST(GltfMeshExtras, UnknownSchemesAreRefusedByMeshAndName) {
   const test::TemporaryFolder folder;
-  for (const char* value : {"\"catmark\"", "7", "null"}) {
+  for (const char* value : {"\"catmark\"", "7", "true"}) {
     const std::string extras = std::string(R"({"farfield_subdivision": )") + value + "}";
     const auto refused = read_source(folder.write("a.glb", two_triangles("{}", extras)));
     ASSERT_FALSE(refused) << value;

@@ -53,9 +53,9 @@ TEST(SubdivisionOptions, EachHasItsOwnTextAndHash) {
   EXPECT_EQ(hash_of(finer), hash_of(catmull_clark()));
 }
 
-TEST(SubdivisionOptions, WithoutSchemeSourcesKeepTheirHash) {
+TEST(SubdivisionOptions, WithoutSchemeAndAllAsUsualSourcesKeepTheirHash) {
   SubdivisionOptions options;
-  options.error = 3;
+  options.grid = 64;
   EXPECT_EQ(canonical_text(options), "");
   EXPECT_EQ(hash_of(options), 0u);
   const test::TemporaryFolder folder;
@@ -66,6 +66,27 @@ TEST(SubdivisionOptions, WithoutSchemeSourcesKeepTheirHash) {
   EXPECT_EQ(*hash_source(file, {}, cage), read_source(file, cage)->source_hash);
   cage.subdivision = options;
   EXPECT_EQ(read_source(file, plain)->source_hash, read_source(file, cage)->source_hash);
+}
+
+/// Meshes may say their own scheme, and displaced ones need none.
+TEST(SubdivisionOptions, WithoutSchemeTheyAreHeardAllTheSame) {
+  std::vector<SubdivisionOptions> all(6);
+  all[0].error = 1;
+  all[1].detail = 0.5;
+  all[2].displace = false;
+  all[3].edge = 2;
+  all[4].boundary = CageBoundary::EdgeOnly;
+  std::set<std::string> texts;
+  std::set<uint64_t> hashes;
+  for (const SubdivisionOptions& options : all) {
+    texts.insert(canonical_text(options));
+    hashes.insert(hash_of(options));
+  }
+  EXPECT_EQ(texts.size(), all.size());
+  EXPECT_EQ(hashes.size(), all.size());
+  SubdivisionOptions bad;
+  bad.detail = 0;
+  EXPECT_FALSE(check_options(bad));
 }
 
 }  // namespace

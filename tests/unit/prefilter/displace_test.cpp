@@ -198,7 +198,10 @@ TEST(Displace, ACageMovesAlongItsLimitNormals) {
 }
 
 TEST(Displace, DisplacedCagesKeepWithinTheErrorOfTheFinelyCutOne) {
-  const SourceMesh cage = with_heights(with_islands(cube_cage()), heights_of(256, waves));
+  // No height at the rims of islands: where it jumps, what lies between depends on the size of faces.
+  const auto heights =
+      heights_of(256, [](double u, double v) { return 0.03 * std::sin(2 * kTau * u) * std::sin(kTau * v); });
+  const SourceMesh cage = with_heights(with_islands(cube_cage()), heights);
   const SourceMesh coarse = displaced(cage, on_grid(128, SubdivisionScheme::CatmullClark));
   SubdivisionOptions fine_options = on_grid(128, SubdivisionScheme::CatmullClark);
   fine_options.error = 1e-3;
