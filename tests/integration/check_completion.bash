@@ -20,7 +20,7 @@ offers "bake" ba
 offers "bake info analyse verify evaluate export render shot trade why sky" ""
 offers "--version" --ver
 offers "--budget" render --bud
-offers "--no-sky" render scene.glb -o out.exr --no
+offers "--no-sky --no-displacement" render scene.glb -o out.exr --no
 offers "-o" bake -o
 offers "--level" export --le
 offers "" verify --bud
