@@ -64,6 +64,9 @@ class GridEnds : openvdb::io::Archive {
   explicit GridEnds(const std::string& path) {
     std::ifstream stream(path, std::ios::binary);
     readHeader(stream);
+    setFormatVersion(stream);
+    setLibraryVersion(stream);
+    setDataCompression(stream);
     openvdb::MetaMap().readMeta(stream);
     for (int32_t i = 0, count = readGridCount(stream); i < count && stream; ++i) {
       openvdb::io::GridDescriptor grid;

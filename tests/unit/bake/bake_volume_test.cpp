@@ -125,7 +125,7 @@ MarchedRays march(const fs::path& source, double scale, int steps) {
   FogOptions options;
   options.density_scale = scale;
   const SourceVolume volume = read_volume(source, options).value();
-  const FogLevel level = pack_source_fog(volume).value();
+  const LevelData level = copy_of(view_of(pack_source_fog(volume).value()));
   std::vector<test::VdbRay> rays;
   Rng rng(5);
   const dvec3 middle = volume.origin + 0.5 * volume.voxel_size * (volume.rotation * dvec3(volume.dims));

@@ -346,13 +346,13 @@ TEST(LayerWalk, LayersOneAfterTheOtherAreAllOfThem) {
     VoxelRay ray = upwards(isotropic_line(box, even_coordinates(i, 7)));
     if (i % 5 == 0) ray.direction = {i % 2 == 0 ? 1 : 0, i % 2, 0};   // within a layer
     if (i % 7 == 0) ray.origin = glm::round(ray.origin / 8.0) * 8.0;  // through edges and corners
-    if (i % 11 == 0) ray.direction = glm::normalize(dvec3(i % 3 - 1.0, 1, 1));
+    if (i % 11 == 0) ray.direction = glm::normalize(dvec3(int(i % 3) - 1, 1, 1));
     const auto all = walked(ray, dims, {0, 9});
     EXPECT_EQ(all, walked(ray, dims, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9})) << i;
     EXPECT_EQ(all, walked(ray, dims, {0, 4, 9})) << i;
     for (size_t n = 0; n < all.size(); ++n) {
       EXPECT_LT(all[n][3], all[n][4]);
-      if (n > 0) EXPECT_EQ(all[n - 1][4], all[n][3]);
+      EXPECT_EQ(n == 0 ? all[0][3] : all[n - 1][4], all[n][3]);
       const dvec3 middle = ray.origin + 0.5 * (all[n][3] + all[n][4]) * ray.direction;
       for (int a = 0; a < 3; ++a) {
         EXPECT_GE(middle[a], 8 * all[n][size_t(a)] - 1e-9);
