@@ -23,6 +23,7 @@
 #include "bake/pack_source.h"
 #include "bake/stopwatch.h"
 #include "bake/volume_job.h"
+#include "base/big_vector.h"
 #include "base/file_io.h"
 #include "base/free_memory.h"
 #include "base/hash.h"
@@ -496,7 +497,7 @@ class Baker {
     level_report.voxels = voxel_count(level);
     if (options_.job.is_cancelled()) return cancelled();
     FARFIELD_TRY_LET(level_report.is_written,
-                     writer_.write(level, level_report.grid, most_bytes_worth_writing(number)));
+                     writer_.write(view_of(level), level_report.grid, most_bytes_worth_writing(number)));
     if (level_report.is_written && number > 0)
       from_stored_ = identity_maps(surface_.positions.size(), surface_.triangles.size());
     return {};
@@ -587,7 +588,9 @@ Result<BakeReport> bake_unless_up_to_date(Task task, const fs::path& out, const 
     if (auto manifest = find_same()) return nothing_to_do(std::move(*manifest), watch);
   }
   const std::vector<std::string> warnings = report.warnings;
-  FARFIELD_TRY_LET(auto baked, with_warnings(task.run(std::move(workspace), std::move(report)), warnings));
+  FARFIELD_TRY_LET(
+      auto baked,
+      with_warnings(with_scratch([&] { return task.run(std::move(workspace), std::move(report)); }), warnings));
   baked.total_seconds = watch.seconds();
   return baked;
 }

@@ -46,7 +46,7 @@ Result<BakeReport> bake_levels(const SourceVolume& volume, const BakeOptions& op
     const Job job = options.job.step(fmt::format("level {}: {}", level, level == 0 ? "pack" : "downsample"),
                                      done_before(level, last), done_before(level + 1, last));
     const Stopwatch making;
-    FARFIELD_TRY_LET(const LevelData packed,
+    FARFIELD_TRY_LET(const FogLevel packed,
                      level == 0 ? pack_source_fog(volume, job) : pack_fog(volume, level, options.downsampling, job));
     done.voxels = voxel_count(packed);
     done.voxelize_seconds = making.seconds();
@@ -54,7 +54,7 @@ Result<BakeReport> bake_levels(const SourceVolume& volume, const BakeOptions& op
     const uint64_t most = manifest.levels.empty()
                               ? std::numeric_limits<uint64_t>::max()
                               : most_bytes_after(manifest.levels.back().resident_bytes, level == last);
-    FARFIELD_TRY_LET(done.is_written, writer.write(packed, done.grid, most));
+    FARFIELD_TRY_LET(done.is_written, writer.write(view_of(packed), done.grid, most));
     done.write_seconds = writing.seconds();
     report.levels.push_back(done);
   }

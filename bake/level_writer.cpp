@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "base/file_io.h"
 #include "bvh/level_scene.h"
 #include "bvh/ray_cost.h"
 #include "bvh/traced_morph.h"
@@ -31,10 +32,9 @@ void add_to_hull(const LevelView& level, SlabHull& hull) {
 LevelWriter::LevelWriter(std::filesystem::path folder, MeasureLevel measure, Manifest& manifest)
     : folder_(std::move(folder)), measure_(std::move(measure)), manifest_(manifest) {}
 
-Result<bool> LevelWriter::write(const LevelData& level, uint32_t grid, uint64_t most_bytes) {
+Result<bool> LevelWriter::write(const LevelView& level, uint32_t grid, uint64_t most_bytes) {
   if (!level.has_surface() && !level.has_volume()) return false;  // too thin for any ray to have hit it
-  const LevelView view = view_of(level);
-  FARFIELD_TRY_LET(const auto cost, measure_ ? measure_(view) : measure_level_scene(view));
+  FARFIELD_TRY_LET(const auto cost, measure_ ? measure_(level) : measure_level_scene(level));
   if (cost.resident_bytes > most_bytes) return false;
 
   LevelEntry entry;
@@ -47,15 +47,15 @@ Result<bool> LevelWriter::write(const LevelData& level, uint32_t grid, uint64_t 
   entry.bricks = level.bricks.size();
   entry.resident_bytes = cost.resident_bytes;
   entry.build_peak_bytes = cost.build_peak_bytes;
-  entry.ray_cost = ray_cost(view);
+  entry.ray_cost = ray_cost(level);
   const std::filesystem::path path = folder_ / entry.file;
   FARFIELD_TRY_LET(entry.file_bytes, write_level(path, level));
-  FARFIELD_TRY_LET(entry.file_hash, hash_level_file(path));
+  FARFIELD_TRY_LET(entry.file_hash, hash_file(path));
   if (!manifest_.levels.empty()) {
-    FARFIELD_TRY_LET(entry.morph, measure_morph_to(view));
+    FARFIELD_TRY_LET(entry.morph, measure_morph_to(level));
   }
   manifest_.levels.push_back(entry);
-  add_to_hull(view, hull_);
+  add_to_hull(level, hull_);
   return true;
 }
 

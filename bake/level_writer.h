@@ -22,7 +22,7 @@ class LevelWriter {
 
   /// Writes a level as level_K.ffl and notes it in the manifest, unless it has nothing in it or takes more than
   /// `most_bytes` of a host's memory; whether it was written. grid: for the manifest. Errors: Io, those of measuring.
-  Result<bool> write(const LevelData& level, uint32_t grid, uint64_t most_bytes);
+  Result<bool> write(const LevelView& level, uint32_t grid, uint64_t most_bytes);
 
   /// Gives the manifest the hull and the bounds of all levels, and writes it. Errors: those of write_manifest().
   Result<void> finish();

@@ -14,8 +14,8 @@
 namespace farfield {
 
 /// Arrays that are nothing but their default are not stored.
-template <typename T>
-void drop_if_all(std::vector<T>& values, const T& default_value) {
+template <typename T, typename Allocator>
+void drop_if_all(std::vector<T, Allocator>& values, const T& default_value) {
   if (std::ranges::all_of(values, [&](const T& v) { return v == default_value; })) free_memory(values);
 }
 
@@ -30,20 +30,23 @@ std::vector<Packed> pack_each(const std::vector<Source>& source, const Pack& pac
 }
 
 /// What flakes look like, of those channels that say anything. roughness2_of(voxel): alpha^2.
-template <typename Voxel, typename Roughness2>
-void pack_looks(const std::vector<Voxel>& voxels, const Roughness2& roughness2_of, LevelData& level) {
-  level.voxel_diffuse = pack_colors(voxels, [](const Voxel& v) { return v.diffuse; });
-  level.voxel_specular = pack_colors(voxels, [](const Voxel& v) { return v.specular; });
-  level.voxel_transmission = pack_colors(voxels, [](const Voxel& v) { return v.transmission; });
-  level.voxel_octants = pack_each<PackedOctants>(voxels, [](const Voxel& v) { return v.octants; });
-  level.voxel_emission = pack_each<PackedRadiance>(voxels, [](const Voxel& v) { return pack_radiance(v.emission); });
+template <typename Voxel, typename Roughness2, typename Level>
+void pack_looks(const std::vector<Voxel>& voxels, const Roughness2& roughness2_of, Level& level) {
+  const auto set = [](auto& array, const auto& packed) { array.assign(packed.begin(), packed.end()); };
+  set(level.voxel_diffuse, pack_colors(voxels, [](const Voxel& v) { return v.diffuse; }));
+  set(level.voxel_specular, pack_colors(voxels, [](const Voxel& v) { return v.specular; }));
+  set(level.voxel_transmission, pack_colors(voxels, [](const Voxel& v) { return v.transmission; }));
+  set(level.voxel_octants, pack_each<PackedOctants>(voxels, [](const Voxel& v) { return v.octants; }));
+  set(level.voxel_emission,
+      pack_each<PackedRadiance>(voxels, [](const Voxel& v) { return pack_radiance(v.emission); }));
   drop_if_all(level.voxel_diffuse, PackedColor{});
   drop_if_all(level.voxel_specular, PackedColor{});
   drop_if_all(level.voxel_transmission, PackedColor{});
   drop_if_all(level.voxel_octants, kFullOctants);
   drop_if_all(level.voxel_emission, PackedRadiance{});
   if (level.voxel_specular.empty()) return;
-  level.voxel_roughness2 = pack_each<uint8_t>(voxels, [&](const Voxel& v) { return pack_unorm8(roughness2_of(v)); });
+  set(level.voxel_roughness2,
+      pack_each<uint8_t>(voxels, [&](const Voxel& v) { return pack_unorm8(roughness2_of(v)); }));
 }
 
 /// Fills in the prefix sums of a brick's mask. Returns how many voxels it has.

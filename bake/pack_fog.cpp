@@ -10,6 +10,7 @@
 #include "bake/pack_arrays.h"
 #include "bake/pack_colors.h"
 #include "base/parallel.h"
+#include "cache/level_format.h"
 #include "prefilter/fog_shape.h"
 #include "scattering/highlight_lean.h"
 #include "scattering/hot_spot.h"
@@ -19,6 +20,8 @@
 
 namespace farfield {
 namespace {
+
+constexpr uint32_t kWideLevel = 4;  ///< from which on a brick stands for more of the source than should be in memory
 
 using FogVoxels = std::array<FogVoxel, kBrickVoxels>;
 
@@ -61,8 +64,8 @@ PackedFog pack_brick(const FogVoxels& voxels, bool has_flakes) {
   return packed;
 }
 
-template <typename T>
-void append(std::vector<T>& all, const std::vector<T>& more) {
+template <typename T, typename Allocator>
+void append(std::vector<T, Allocator>& all, const std::vector<T>& more) {
   all.insert(all.end(), more.begin(), more.end());
 }
 
@@ -93,29 +96,36 @@ float roughness2_of(const FlakeLook& look) {
   return alpha * alpha;
 }
 
+void rest_arrays(const FogLevel& level) {
+  for_each_section(level, [](SectionId, const auto& array) { rest(array); });
+}
+
 /// Makes a level from its bricks. voxels_of(brick, voxels): false where the brick is empty; called from many threads.
 template <typename VoxelsOf>
-Result<LevelData> pack_bricks(const SourceVolume& source, const ivec3& dims, double voxel_size,
-                              const FogChannels& channels, const Job& job, const VoxelsOf& voxels_of) {
+Result<FogLevel> pack_bricks(const SourceVolume& source, const ivec3& dims, double voxel_size,
+                             const FogChannels& channels, const Job& job, const VoxelsOf& voxels_of) {
   constexpr size_t kBatch = 4096;  // bricks that are in memory in full before they join the level
-  LevelData level;
+  FogLevel level;
   level.header.resolution = static_cast<float>(voxel_size);
   set_medium(source, level.header);
   level.header.brick_dims = (dims + (kBrickSide - 1)) / kBrickSide;
   const ivec3& n = level.header.brick_dims;
   const size_t entries = static_cast<size_t>(n.x) * static_cast<size_t>(n.y) * static_cast<size_t>(n.z);
   level.brick_table.assign(entries, kNoBrick);
+  level.bricks.reserve(std::min<size_t>(entries, source.filled_bricks));
   std::vector<PackedFog> batch(std::min(kBatch, entries));
   std::vector<FlakeLook> looks;
   uint32_t payload_base = 0;
   for (size_t first = 0; first < entries; first += kBatch) {
     if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, "bake: cancelled");
+    if (is_much_in_memory()) rest_arrays(level);
     job.report(static_cast<double>(first) / static_cast<double>(entries), "");
     const size_t count = std::min(kBatch, entries - first);
     parallel_for(count, 8, [&](size_t begin, size_t end) {
       const auto voxels = std::make_unique<FogVoxels>();
       for (size_t i = begin; i < end; ++i) {
         batch[i] = PackedFog();
+        if (is_much_in_memory()) rest(source);
         if (job.is_cancelled() || !voxels_of(brick_coordinates(level.header, first + i), *voxels)) continue;
         batch[i] = pack_brick(*voxels, source.flakes.has_value());
       }
@@ -150,7 +160,7 @@ Result<LevelData> pack_bricks(const SourceVolume& source, const ivec3& dims, dou
 }
 
 FlakeLook source_look(const SourceFlakes& flakes, uint32_t brick, size_t i) {
-  const auto color = [&](const std::vector<ColorBrick>& colors) {
+  const auto color = [&](const BigVector<ColorBrick>& colors) {
     return colors.empty() ? vec3(0.0f) : colors[brick][i];
   };
   FlakeLook look{color(flakes.diffuse), color(flakes.specular), color(flakes.transmission), color(flakes.emission)};
@@ -179,7 +189,16 @@ FogVoxel source_voxel(const SourceVolume& source, uint32_t brick, size_t i) {
 
 }  // namespace
 
-Result<LevelData> pack_source_fog(const SourceVolume& source, const Job& job) {
+LevelView view_of(const FogLevel& level) {
+  LevelView view;
+  view.header = level.header;
+#define FARFIELD_VIEW(id, Name, field, Element, Group) view.field = level.field;
+  FARFIELD_LEVEL_ARRAYS(FARFIELD_VIEW)
+#undef FARFIELD_VIEW
+  return view;
+}
+
+Result<FogLevel> pack_source_fog(const SourceVolume& source, const Job& job) {
   const bool is_fog = !source.flakes;
   const FogChannels channels{is_fog && !source.albedos.empty(), !source.self_shadowing.empty(), !source.shapes.empty(),
                              is_fog && !source.anisotropies.empty()};
@@ -192,7 +211,7 @@ Result<LevelData> pack_source_fog(const SourceVolume& source, const Job& job) {
   return pack_bricks(source, source.dims, source.voxel_size, channels, job, voxels_of);
 }
 
-Result<LevelData> pack_fog(const SourceVolume& source, uint32_t level, Downsampling method, const Job& job) {
+Result<FogLevel> pack_fog(const SourceVolume& source, uint32_t level, Downsampling method, const Job& job) {
   const FogDownsampler downsampler(source, level, method);
   const bool is_fog = !source.flakes, has_anisotropies = !source.anisotropies.empty();
   const FogChannels channels{is_fog && (has_own_albedos(source) || has_anisotropies),
@@ -208,6 +227,7 @@ Result<LevelData> pack_fog(const SourceVolume& source, uint32_t level, Downsampl
     const uint32_t densities = matched.brick_at(brick);
     // In parallel here, too: a root has few bricks.
     parallel_for(voxels.size(), 16, [&](size_t begin, size_t end) {
+      if (level >= kWideLevel && is_much_in_memory()) rest(source);
       for (size_t i = begin; i < end; ++i) {
         const ivec3 voxel = voxel_in_brick(static_cast<int>(i));
         const bool is_inside = voxel.x < inside.x && voxel.y < inside.y && voxel.z < inside.z;

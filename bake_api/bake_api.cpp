@@ -124,6 +124,8 @@ Result<BakeSummary> run_limited(const BakeSettings& settings, const Run& run) {
                            report.error().warnings);
     }
     return tl::unexpected(report.error());
+  } catch (const ScratchFull& full) {
+    return tl::unexpected(full.error);
   } catch (const std::bad_alloc&) {
     return out_of_memory("the system has no more memory", {});
   }

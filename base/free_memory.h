@@ -7,9 +7,9 @@
 namespace farfield {
 
 /// `values = {}` empties a vector and keeps its memory.
-template <typename T>
-void free_memory(std::vector<T>& values) {
-  std::vector<T>().swap(values);
+template <typename T, typename Allocator>
+void free_memory(std::vector<T, Allocator>& values) {
+  std::vector<T, Allocator>().swap(values);
 }
 
 }  // namespace farfield

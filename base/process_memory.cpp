@@ -47,6 +47,14 @@ uint64_t kernel_peak_bytes() {
   return line == std::string_view::npos ? 0 : 1024 * number_after(status.text(), line);
 }
 
+// Number `column` of statm, from 0: size, resident, shared, ..., in pages.
+uint64_t statm_bytes(int column) {
+  const ProcFile statm("/proc/self/statm");
+  size_t space = 0;
+  for (int i = 0; i < column; ++i) space = statm.text().find(' ', space + 1);
+  return number_after(statm.text(), space) * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
 bool reset_kernel_peak() {
   const int fd = open("/proc/self/clear_refs", O_WRONLY | O_CLOEXEC);
   if (fd < 0) return false;
@@ -57,11 +65,8 @@ bool reset_kernel_peak() {
 
 }  // namespace
 
-uint64_t resident_set_bytes() {
-  const ProcFile statm("/proc/self/statm");  // size resident shared ..., in pages
-  const size_t second = statm.text().find(' ');
-  return number_after(statm.text(), second) * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
-}
+uint64_t resident_set_bytes() { return statm_bytes(1); }
+uint64_t mapped_set_bytes() { return statm_bytes(2); }
 
 PeakMemory::PeakMemory() : kernel_keeps_mark_(reset_kernel_peak()) {
   if (!kernel_keeps_mark_) sampler_ = std::thread([this] { sample_until_stopped(); });

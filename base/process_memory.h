@@ -13,6 +13,9 @@ namespace farfield {
 /// Resident set size now: anonymous, file and shared pages, as `ps` shows it. 0 if /proc cannot be read.
 uint64_t resident_set_bytes();
 
+/// The part of it that lies in mapped files and shared memory. 0 if /proc cannot be read.
+uint64_t mapped_set_bytes();
+
 /// The highest resident set size since construction. The kernel keeps it if it lets us reset its mark; otherwise a
 /// thread looks every 5 ms. One at a time in a process: they share the kernel's mark.
 class PeakMemory {

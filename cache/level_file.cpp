@@ -72,13 +72,12 @@ std::vector<FileRange> build_only_pages(const LevelLayout& layout) {
 
 }  // namespace
 
-Result<uint64_t> write_level(const std::filesystem::path& path, const LevelData& level) {
-  const LevelView view = view_of(level);
+Result<uint64_t> write_level(const std::filesystem::path& path, const LevelView& view) {
   auto problem = find_structure_problem(view);
   if (!problem) problem = find_value_problem(view);
   if (problem) {
     return make_error(ErrorCode::InvalidArgument,
-                      fmt::format("cannot write level {} to {}: {}", level.header.level, path.string(), *problem));
+                      fmt::format("cannot write level {} to {}: {}", view.header.level, path.string(), *problem));
   }
 
   const LevelLayout layout = layout_of(view);
@@ -170,11 +169,6 @@ void LevelFile::release_build_pages() {
     ::madvise(begin, bytes, MADV_DONTNEED);
     ::madvise(begin, bytes, MADV_NOHUGEPAGE);  // or the system may fill them again to make large pages
   }
-}
-
-Result<uint64_t> hash_level_file(const std::filesystem::path& path) {
-  FARFIELD_TRY_LET(const auto file, LevelFile::open(path, LevelCheck::Structure));
-  return hash_bytes(file->bytes());
 }
 
 }  // namespace farfield

@@ -16,7 +16,10 @@ namespace farfield {
 /// Writes `level` to `path`: to a temporary name beside it, synced, then renamed, so that the file is whole or absent.
 /// The bytes depend only on the level. Returns the file's size. Errors: Io (naming the path and the system's words),
 /// InvalidArgument (a level that open() would refuse).
-Result<uint64_t> write_level(const std::filesystem::path& path, const LevelData& level);
+Result<uint64_t> write_level(const std::filesystem::path& path, const LevelView& level);
+inline Result<uint64_t> write_level(const std::filesystem::path& path, const LevelData& level) {
+  return write_level(path, view_of(level));
+}
 
 /// What a level takes on disk and in memory, exact, before it is written.
 struct LevelFileSizes {
@@ -68,8 +71,5 @@ class LevelFile {
   uint64_t file_bytes_ = 0;
   LevelView view_;
 };
-
-/// The hash that a manifest records of a level file: of all its bytes. Errors: those of LevelFile::open.
-Result<uint64_t> hash_level_file(const std::filesystem::path& path);
 
 }  // namespace farfield

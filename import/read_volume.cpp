@@ -96,7 +96,7 @@ Result<SourceVolume> read_volume(const fs::path& path, const FogOptions& options
   FARFIELD_TRY(check_exists(path));
   FARFIELD_TRY_LET(const VolumeModule* module, volume_module());
   FARFIELD_TRY_LET(auto read, module->read(path.string(), options, job));
-  FARFIELD_TRY_LET(auto volume, on_cubes(path, std::move(read), job));
+  FARFIELD_TRY_LET(auto volume, with_scratch([&] { return on_cubes(path, std::move(read), job); }));
   FARFIELD_TRY_LET(volume.source_hash, hash_volume(path, options));
   return volume;
 }

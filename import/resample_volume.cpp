@@ -138,6 +138,7 @@ class Resampler {
     std::vector<uint32_t> only(batch.size());
     for (size_t first = 0; first < entries; first += kBatch) {
       if (job_.is_cancelled()) return make_error(ErrorCode::Cancelled, "read volume: cancelled");
+      if (is_much_in_memory()) rest(source_), rest(out_);
       const size_t count = std::min(kBatch, entries - first);
       parallel_for(count, 4, [&](size_t begin, size_t end) {
         for (size_t i = begin; i < end; ++i) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/big_vector.h"
 #include "base/vec.h"
 
 namespace farfield {
@@ -41,8 +42,8 @@ struct DensityGrid {
   ivec3 dims{0};          ///< voxels; the rest of the last bricks is empty
   ivec3 brick_dims{0};
   std::vector<uint32_t> brick_table;  ///< x fastest: index into bricks, or kEmptyBrick
-  std::vector<DensityBrick> bricks;   ///< in no particular order
-  std::vector<ShapeBrick> shapes;     ///< none: round everywhere, and densities are sigma_t. Else as many as bricks
+  BigVector<DensityBrick> bricks;     ///< in no particular order
+  BigVector<ShapeBrick> shapes;       ///< none: round everywhere, and densities are sigma_t. Else as many as bricks
 
   size_t table_index(const ivec3& brick) const {
     return static_cast<size_t>(brick.x) +
@@ -64,10 +65,10 @@ struct DensityGrid {
 
 /// What voxels have that are flakes, pieces of surfaces, and no fog. Each vector: none, or as many as bricks.
 struct SourceFlakes {
-  std::vector<ColorBrick> diffuse, specular, transmission;  ///< reflectances in [0, 1]; none: 0
-  std::vector<ColorBrick> emission;                         ///< radiance; none: 0
-  std::vector<NumberBrick> roughness;                       ///< GGX alpha is its square; with specular
-  std::vector<OctantsBrick> octants;       ///< how octants share the largest density; the voxel's is their mean
+  BigVector<ColorBrick> diffuse, specular, transmission;  ///< reflectances in [0, 1]; none: 0
+  BigVector<ColorBrick> emission;                         ///< radiance; none: 0
+  BigVector<NumberBrick> roughness;                       ///< GGX alpha is its square; with specular
+  BigVector<OctantsBrick> octants;         ///< how octants share the largest density; the voxel's is their mean
   float hot_spot = 0, highlight_lean = 0;  ///< of all, as levels have them
   vec3 open_side{0.0f};                    ///< the same, along the grid's axes
 };
@@ -75,20 +76,38 @@ struct SourceFlakes {
 /// Immutable once read; any thread. Bounds are tight: the first and the last voxel along each axis that have a density
 /// are in it. Bricks may be shared by entries of the table (tiles).
 struct SourceVolume : DensityGrid {
-  dvec3 origin{0.0};                        ///< lower corner of voxel (0, 0, 0), in the source's space
-  glm::dmat3 rotation{1.0};                 ///< columns: the grid's axes in the source's space; orthonormal, may mirror
-  std::vector<AlbedoBrick> albedos;         ///< none: `albedo` everywhere. Else as many as bricks
-  vec3 albedo{1.0f};                        ///< single scattering, linear RGB in [0, 1]
-  float anisotropy = 0;                     ///< g of Henyey and Greenstein
-  std::vector<NumberBrick> anisotropies;    ///< none: `anisotropy` everywhere. Else as many as bricks
-  std::vector<NumberBrick> self_shadowing;  ///< A in (0, 1]; none: 1. Else as many as bricks
-  std::optional<SourceFlakes> flakes;       ///< none: fog. Else albedos and anisotropies do not count
-  uint64_t active_voxels = 0;               ///< with a density
-  uint64_t filled_bricks = 0;               ///< entries of the table that are not kEmptyBrick
-  float densest = 0;                        ///< the largest density
-  std::vector<std::string> warnings;        ///< one line each: what was ignored, guessed or dropped
-  uint64_t source_hash = 0;                 ///< of the file's bytes and the options
+  dvec3 origin{0.0};                      ///< lower corner of voxel (0, 0, 0), in the source's space
+  glm::dmat3 rotation{1.0};               ///< columns: the grid's axes in the source's space; orthonormal, may mirror
+  BigVector<AlbedoBrick> albedos;         ///< none: `albedo` everywhere. Else as many as bricks
+  vec3 albedo{1.0f};                      ///< single scattering, linear RGB in [0, 1]
+  float anisotropy = 0;                   ///< g of Henyey and Greenstein
+  BigVector<NumberBrick> anisotropies;    ///< none: `anisotropy` everywhere. Else as many as bricks
+  BigVector<NumberBrick> self_shadowing;  ///< A in (0, 1]; none: 1. Else as many as bricks
+  std::optional<SourceFlakes> flakes;     ///< none: fog. Else albedos and anisotropies do not count
+  uint64_t active_voxels = 0;             ///< with a density
+  uint64_t filled_bricks = 0;             ///< entries of the table that are not kEmptyBrick
+  float densest = 0;                      ///< the largest density
+  std::vector<std::string> warnings;      ///< one line each: what was ignored, guessed or dropped
+  uint64_t source_hash = 0;               ///< of the file's bytes and the options
 };
+
+/// What of it is in files leaves memory until it is looked at again (base/big_vector.h). Any thread.
+inline void rest(const DensityGrid& grid) {
+  rest(grid.bricks);
+  rest(grid.shapes);
+}
+inline void rest(const SourceVolume& volume) {
+  rest(static_cast<const DensityGrid&>(volume));
+  rest(volume.albedos);
+  rest(volume.anisotropies);
+  rest(volume.self_shadowing);
+  if (!volume.flakes) return;
+  for (const auto* colors :
+       {&volume.flakes->diffuse, &volume.flakes->specular, &volume.flakes->transmission, &volume.flakes->emission})
+    rest(*colors);
+  rest(volume.flakes->roughness);
+  rest(volume.flakes->octants);
+}
 
 /// Index of a voxel within its brick.
 inline size_t index_in_brick(const ivec3& voxel) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <initializer_list>
 
+#include "import/vdb_leaves.h"
 #include "import/voxel_ellipsoid.h"
 
 namespace farfield {
@@ -14,6 +15,8 @@ namespace {
 
 using openvdb::Coord;
 using Matrix = glm::dmat3;
+
+constexpr size_t kBricksBetweenRests = 256;
 
 /// "_level_3" of "density_level_3", a grid of several levels as OpenVDB's tools and ours name them; else nothing.
 std::string level_suffix(const std::string& name) {
@@ -84,8 +87,13 @@ class ChannelReader {
     if (!grid) return error(ErrorCode::BadFile, "the grid \"{}\" cannot be read as {}", name, header->valueType());
     unshare_bricks();
     const auto accessor = grid->getConstAccessor();
+    const auto leaves = from_.is_paged ? sorted_leaves(*grid) : std::vector<typename Grid::TreeType::LeafNodeType*>();
+    size_t dropped = 0;
     Result<void> done;
     for_each_place([&](const Place& place) {
+      // Places come by bricks, and the next one may start seven layers before this one.
+      while (dropped < leaves.size() && leaves[dropped]->origin().z() + 2 * kVolumeBrickSide <= place.at.z())
+        drop_values(*leaves[dropped++]);
       const auto& value = accessor.getValue(place.at);
       if (is_number(value))
         take(place, value);
@@ -102,6 +110,7 @@ class ChannelReader {
     for (size_t entry = 0; entry < volume_.brick_table.size(); ++entry) {
       const uint32_t index = volume_.brick_table[entry];
       if (index == kEmptyBrick) continue;
+      if (entry % kBricksBetweenRests == 0 && is_much_in_memory()) rest(volume_);
       const ivec3 corner = volume_.brick_of_entry(entry) * kVolumeBrickSide;
       for (int i = 0; i < kVolumeBrickVoxels; ++i) {
         if (!(volume_.bricks[index][static_cast<size_t>(i)] > 0)) continue;
@@ -115,6 +124,7 @@ class ChannelReader {
   void unshare_bricks() {
     if (is_unshared_) return;
     is_unshared_ = true;
+    volume_.bricks.reserve(volume_.filled_bricks);
     std::vector<bool> is_used(volume_.bricks.size(), false);
     for (uint32_t& index : volume_.brick_table) {
       if (index == kEmptyBrick) continue;
@@ -128,7 +138,7 @@ class ChannelReader {
   }
 
   /// A channel of numbers within [least, most]; values outside are clamped, and said to be.
-  Result<bool> read_numbers(const char* name, float least, float most, std::vector<NumberBrick>& bricks) {
+  Result<bool> read_numbers(const char* name, float least, float most, BigVector<NumberBrick>& bricks) {
     uint64_t clamped = 0;
     FARFIELD_TRY_LET(const bool is_there, read<openvdb::FloatGrid>({name}, [&](const Place& p, float value) {
                        bricks.resize(volume_.bricks.size());
@@ -141,7 +151,7 @@ class ChannelReader {
   }
 
   /// The same of colours.
-  Result<bool> read_colors(const char* name, float most, std::vector<ColorBrick>& bricks) {
+  Result<bool> read_colors(const char* name, float most, BigVector<ColorBrick>& bricks) {
     uint64_t clamped = 0;
     FARFIELD_TRY_LET(const bool is_there,
                      read<openvdb::Vec3SGrid>({name}, [&](const Place& p, const openvdb::Vec3s& value) {
@@ -263,7 +273,7 @@ class ChannelReader {
   }
 
   Result<void> read_fibres() {
-    std::vector<ColorBrick> directions;
+    BigVector<ColorBrick> directions;
     FARFIELD_TRY_LET(const bool is_there,
                      read<openvdb::Vec3SGrid>({"fibre", "fiber", "direction"}, [&](const Place& p, const auto& v) {
                        directions.resize(volume_.bricks.size());

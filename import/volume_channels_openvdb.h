@@ -26,6 +26,7 @@ struct VdbChannels {
   const std::vector<openvdb::GridBase::Ptr>& grids;                            ///< all of the file's, without voxels
   const openvdb::GridBase& density;                                            ///< the chosen one of these
   openvdb::Coord first_voxel;                                                  ///< of the volume, in the file's lattice
+  bool is_paged;  ///< load() gives grids whose leaves may go once looked at
 };
 
 /// Adds to a volume whose densities and rotation are known what else the file has on its lattice; where there are

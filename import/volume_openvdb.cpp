@@ -3,19 +3,24 @@
 // Nothing of OpenVDB leaves this file; what it throws ends here as an Error.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <openvdb/io/Archive.h>
 #include <openvdb/io/File.h>
+#include <openvdb/io/GridDescriptor.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetUtil.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <optional>
 #include <set>
 
 #include "base/text.h"
 #include "farfield/export.h"
+#include "import/vdb_leaves.h"
 #include "import/volume_channels_openvdb.h"
 #include "import/volume_module.h"
 #include "import/volume_nanovdb.h"
@@ -28,6 +33,7 @@ namespace {
 using openvdb::Coord;
 using openvdb::CoordBBox;
 
+constexpr uint64_t kLeavesBetweenRests = 4096;
 constexpr double kSmallNegative = 1e-3;  ///< of the largest density: what filters leave behind, not an error
 constexpr std::array<const char*, 6> kEmissionNames = {"temperature", "heat", "flame", "flames", "fire", "emission"};
 
@@ -50,6 +56,26 @@ struct Contents {
     }
     return text.empty() ? "none" : text;
   }
+};
+
+/// Where the last of a file's grids ends, by what the file says.
+class GridEnds : openvdb::io::Archive {
+ public:
+  explicit GridEnds(const std::string& path) {
+    std::ifstream stream(path, std::ios::binary);
+    readHeader(stream);
+    setFormatVersion(stream);
+    setLibraryVersion(stream);
+    setDataCompression(stream);
+    openvdb::MetaMap().readMeta(stream);
+    for (int32_t i = 0, count = readGridCount(stream); i < count && stream; ++i) {
+      openvdb::io::GridDescriptor grid;
+      grid.read(stream);
+      last = std::max(last, static_cast<uint64_t>(grid.getEndPos()));
+      grid.seekToEnd(stream);
+    }
+  }
+  uint64_t last = 0;
 };
 
 /// How a grid's lattice lies in the source's space.
@@ -100,17 +126,13 @@ class VdbReader {
     volume_.voxel_size = lattice.shape.size;
     volume_.anisotropy = static_cast<float>(options_.anisotropy);
     const std::string name = header->getName();
-    auto base = load(name);
-    if (job_.is_cancelled()) return cancelled();
-    Result<void> done;
-    if (auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(base)) done = take_density(*grid, lattice);
-    if (auto grid = openvdb::gridPtrCast<openvdb::DoubleGrid>(base)) done = take_density(*grid, lattice);
-    FARFIELD_TRY(std::move(done));
-    base.reset();
+    const bool is_double = header->valueType() == "double";
+    FARFIELD_TRY(is_double ? take_density<openvdb::DoubleGrid>(name, lattice)
+                           : take_density<openvdb::FloatGrid>(name, lattice));
     used_ = {name};
-    FARFIELD_TRY(read_channels(
-        {path_, options_, [&](const std::string& grid) { return load(grid); }, contents_.grids, *header, first_voxel_},
-        volume_, used_));
+    FARFIELD_TRY(read_channels({path_, options_, [&](const std::string& grid) { return load(grid); }, contents_.grids,
+                                *header, first_voxel_, is_paged_},
+                               volume_, used_));
     warn_of_the_rest();
     return VolumeOnLattice{std::move(volume_), lattice.shape};
   }
@@ -131,13 +153,26 @@ class VdbReader {
     if (is_nanovdb_file(path_)) {
       FARFIELD_TRY(open_nanovdb());
     } else {
-      file_.open(/*delayLoad=*/false);
+      FARFIELD_TRY(check_whole());
+      file_.setCopyMaxBytes(0);
+      file_.open(/*delayLoad=*/is_paged_);
       for (auto name = file_.beginName(); name != file_.endName(); ++name) {
         contents_.grids.push_back(file_.readGridMetadata(name.gridName()));
       }
     }
     if (contents_.grids.empty()) return error(ErrorCode::BadFile, "there is no grid in it; was it cut short?");
     return choose_density();
+  }
+
+  /// A file that is cut short must not be mapped: what is behind its end reads as anything.
+  Result<void> check_whole() {
+    std::error_code unknown;
+    const uint64_t bytes = std::filesystem::file_size(path_, unknown);
+    is_paged_ = !unknown && bytes >= kPagedFileBytes && !options_.level_set;
+    if (!is_paged_) return {};
+    const uint64_t wanted = GridEnds(path_).last;
+    if (wanted <= bytes) return {};
+    return error(ErrorCode::BadFile, "it is cut short: its grids need {} bytes and it has {}", wanted, bytes);
   }
 
   /// All of its grids are in memory at once.
@@ -229,9 +264,10 @@ class VdbReader {
 
   // ---- densities
 
-  /// What is active: tiles first, then the voxels of leaves, in the tree's order.
+  /// What is active: tiles first, then the voxels of leaves. Of a file that is paged leaves lose their values when
+  /// they have been looked at.
   template <typename Grid, typename Tile, typename Leaf>
-  static void for_each_active(const Grid& grid, const Tile& tile, const Leaf& leaf) {
+  void for_each_active(Grid& grid, const Tile& tile, const Leaf& leaf) const {
     auto value = grid.cbeginValueOn();
     value.setMaxDepth(Grid::ValueOnCIter::LEAF_DEPTH - 1);
     for (; value; ++value) {
@@ -239,38 +275,66 @@ class VdbReader {
       value.getBoundingBox(box);
       tile(box, static_cast<double>(*value));
     }
-    for (auto it = grid.tree().cbeginLeaf(); it; ++it) leaf(*it);
+    for (auto* of_grid : sorted_leaves(grid)) {
+      leaf(*of_grid);
+      if (is_paged_) drop_values(*of_grid);
+    }
   }
 
   template <typename Grid>
-  Result<void> take_density(Grid& grid, const Lattice& lattice) {
-    if (is_level_set(grid)) openvdb::tools::sdfToFogVolume(grid);
-    const double background = static_cast<double>(grid.background());
+  typename Grid::Ptr load_density(const std::string& name) {
+    auto grid = openvdb::gridPtrCast<Grid>(load(name));
+    if (is_level_set(*grid)) openvdb::tools::sdfToFogVolume(*grid);
+    return grid;
+  }
+
+  template <typename Grid>
+  Result<void> take_density(const std::string& name, const Lattice& lattice) {
+    auto grid = load_density<Grid>(name);
+    if (job_.is_cancelled()) return cancelled();
+    const double background = static_cast<double>(grid->background());
     if (background != 0) {
       return error(ErrorCode::Unsupported, "the grid \"{}\" has density {} all around: a volume must end somewhere",
-                   grid.getName(), background);
+                   name, background);
     }
-    FARFIELD_TRY_LET(const CoordBBox box, check_values(grid));
-    FARFIELD_TRY(make_table(grid.getName(), box));
+    FARFIELD_TRY_LET(const CoordBBox box, check_values(*grid));
+    FARFIELD_TRY(make_table(name, box));
     const Coord corner = box.min();
     volume_.origin = lattice.to_source(openvdb::Vec3d(corner.x() - 0.5, corner.y() - 0.5, corner.z() - 0.5));
     first_voxel_ = corner;
+    if (is_paged_) grid = load_density<Grid>(name);
+    volume_.bricks.reserve(bricks_of_leaves(*grid, box));
     Result<void> done;
+    uint64_t leaves = 0;
     for_each_active(
-        grid,
+        *grid,
         [&](const CoordBBox& tile, double value) {
           if (done) done = fill_tile(tile, value);
         },
         [&](const auto& leaf) {
           if (done) done = fill_leaf(leaf);
+          if (++leaves % kLeavesBetweenRests == 0 && is_much_in_memory()) rest(volume_);
         });
     FARFIELD_TRY(std::move(done));
-    return count_voxels(grid.getName());
+    return count_voxels(name);
+  }
+
+  /// How many bricks hold voxels of leaves that are active, within the box: they are there once, and do not grow.
+  template <typename Grid>
+  size_t bricks_of_leaves(Grid& grid, const CoordBBox& box) const {
+    std::vector<bool> is_there(volume_.brick_table.size(), false);
+    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
+      for (auto v = leaf->cbeginValueOn(); v; ++v) {
+        if (!box.isInside(v.getCoord())) continue;
+        const Coord at = v.getCoord() - first_voxel_;
+        is_there[volume_.table_index(ivec3(at.x(), at.y(), at.z()) / kVolumeBrickSide)] = true;
+      }
+    return static_cast<size_t>(std::count(is_there.begin(), is_there.end(), true));
   }
 
   /// The bounds of what has a density, once every value is known to be one.
   template <typename Grid>
-  Result<CoordBBox> check_values(const Grid& grid) {
+  Result<CoordBBox> check_values(Grid& grid) {
     double largest = 0, smallest = 0;
     Coord smallest_at, broken_at;
     std::optional<double> broken;
@@ -433,6 +497,7 @@ class VdbReader {
   const FogOptions& options_;
   const Job& job_;
   openvdb::io::File file_;
+  bool is_paged_ = false;      ///< leaves are read when they are looked at, and not kept
   bool is_in_memory_ = false;  ///< of NanoVDB: file_ is not open, contents_ has voxels
   Contents contents_;
   SourceVolume volume_;
@@ -447,6 +512,8 @@ Result<T> guarded(const std::string& path, const Read& read) {
   try {
     openvdb::initialize();
     return read();
+  } catch (const ScratchFull& full) {
+    return tl::unexpected(full.error);
   } catch (const std::bad_alloc&) {
     return make_error(ErrorCode::BadFile,
                       fmt::format("{}: asks for more memory than there is: it is too large, or damaged", path));

@@ -6,6 +6,7 @@
 
 #include <filesystem>
 
+#include "base/file_io.h"
 #include "base/result.h"
 #include "base/temporary_file.h"
 #include "base/texture_module.h"
@@ -108,7 +109,7 @@ Result<LevelEntry> write_warm_up_level(const fs::path& folder, uint32_t number, 
   entry.grid = static_cast<uint32_t>(std::lround(kSize / resolution));
   entry.file = fmt::format("level_{:02}.bin", number);
   FARFIELD_TRY_LET(const auto bytes, write_level(folder / entry.file, level));
-  FARFIELD_TRY_LET(const auto hash, hash_level_file(folder / entry.file));
+  FARFIELD_TRY_LET(const auto hash, hash_file(folder / entry.file));
   entry.file_bytes = bytes;
   entry.file_hash = hash;
   entry.triangles = face_count(level);

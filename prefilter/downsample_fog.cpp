@@ -239,7 +239,7 @@ class MeanLook {
     double sum = 0, shadowing = 0, roughness = 0, shine = 0;
     dvec3 diffuse(0.0), specular(0.0), transmission(0.0), emission(0.0);
     block.for_each_voxel([&](const FogBlockVoxel& v) {
-      const auto add = [&](const std::vector<ColorBrick>& colors, dvec3& to) {
+      const auto add = [&](const BigVector<ColorBrick>& colors, dvec3& to) {
         if (!colors.empty()) to += v.depth * dvec3(colors[v.brick][v.in_brick]);
       };
       sum += v.depth;
@@ -263,7 +263,7 @@ class MeanLook {
   }
 
  private:
-  static float value_at(const std::vector<NumberBrick>& numbers, const FogBlockVoxel& v, float otherwise) {
+  static float value_at(const BigVector<NumberBrick>& numbers, const FogBlockVoxel& v, float otherwise) {
     return numbers.empty() ? otherwise : numbers[v.brick][v.in_brick];
   }
   const SourceVolume& source_;
@@ -394,6 +394,7 @@ Result<DensityGrid> matched_densities(const SourceVolume& source, uint32_t level
   const size_t entries = static_cast<size_t>(n.x) * static_cast<size_t>(n.y) * static_cast<size_t>(n.z);
   grid.brick_table.assign(entries, kEmptyBrick);
   for (size_t entry = 0; entry < entries; ++entry) {
+    if (is_much_in_memory()) rest(source), rest(grid);
     const ivec3 corner = grid.brick_of_entry(entry) * kVolumeBrickSide;
     DensityBrick brick;
     ShapeBrick shapes;

@@ -41,7 +41,7 @@ Result<Downsampling> parse_downsampling(const std::string& name);
 // light is not followed.
 
 /// Goes up when downsample() comes to give other results.
-inline constexpr uint32_t kFogVersion = 2;
+inline constexpr uint32_t kFogVersion = 3;
 
 /// What a voxel of flakes has besides what fog has: means over its block.
 struct FlakeLook {

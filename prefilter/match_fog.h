@@ -11,7 +11,10 @@
 namespace farfield {
 
 /// Changes the densities of `level`, whose voxels are 2^k of the source's along each axis and start where those do;
-/// none that is 0. The result does not depend on the number of threads. Errors: Cancelled.
-Result<void> match_fog(const DensityGrid& source, uint32_t k, DensityGrid& level, const Job& job);
+/// none that is 0. Lines are followed through one region after the other, layers of bricks of about region_bytes, so
+/// that no more of either grid is in memory at a time than that. The result depends neither on that nor on the number
+/// of threads. Errors: Cancelled.
+Result<void> match_fog(const DensityGrid& source, uint32_t k, DensityGrid& level, const Job& job,
+                       uint64_t region_bytes = uint64_t{192} << 20);
 
 }  // namespace farfield

@@ -169,7 +169,7 @@ Result<std::filesystem::path> write(const std::filesystem::path& folder, const M
   Manifest manifest = source;
   manifest.levels.clear(), manifest.textures.clear(), manifest.bounds = {};
   LevelWriter writer(folder, {}, manifest);
-  for (const LevelData* level : levels) FARFIELD_TRY(writer.write(*level, 1, ~uint64_t{0}));
+  for (const LevelData* level : levels) FARFIELD_TRY(writer.write(view_of(*level), 1, ~uint64_t{0}));
   FARFIELD_TRY(writer.finish());
   return folder;
 }

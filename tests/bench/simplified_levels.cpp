@@ -17,6 +17,7 @@
 #include <filesystem>
 
 #include "bake/pack_level.h"
+#include "base/file_io.h"
 #include "bvh/level_scene.h"
 #include "cache/level_file.h"
 #include "cache/manifest.h"
@@ -126,7 +127,7 @@ Result<LevelEntry> replace(LevelEntry entry, const MeshLevel& mesh, const fs::pa
   entry.build_peak_bytes = mesh.cost.build_peak_bytes;
   entry.errors.reset();
   FARFIELD_TRY_LET(entry.file_bytes, write_level(folder / entry.file, mesh.level));
-  FARFIELD_TRY_LET(entry.file_hash, hash_level_file(folder / entry.file));
+  FARFIELD_TRY_LET(entry.file_hash, hash_file(folder / entry.file));
   return entry;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "base/file_io.h"
 #include "base/hash.h"
 #include "cache/level_file.h"
 #include "cache/level_format.h"
@@ -36,7 +37,7 @@ void write_entry(const std::filesystem::path& folder, const LevelData& level, co
   entry.resolution = level.header.resolution;
   entry.file = "level_" + std::to_string(entry.level) + ".ffl";
   entry.file_bytes = or_stop(write_level(folder / entry.file, level));
-  entry.file_hash = or_stop(hash_level_file(folder / entry.file));
+  entry.file_hash = or_stop(hash_file(folder / entry.file));
   entry.triangles = face_count(level);
   entry.voxels = voxel_count(level);
   entry.bricks = level.bricks.size();

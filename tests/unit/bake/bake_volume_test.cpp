@@ -125,7 +125,7 @@ MarchedRays march(const fs::path& source, double scale, int steps) {
   FogOptions options;
   options.density_scale = scale;
   const SourceVolume volume = read_volume(source, options).value();
-  const LevelData level = pack_source_fog(volume).value();
+  const LevelData level = copy_of(view_of(pack_source_fog(volume).value()));
   std::vector<test::VdbRay> rays;
   Rng rng(5);
   const dvec3 middle = volume.origin + 0.5 * volume.voxel_size * (volume.rotation * dvec3(volume.dims));
@@ -180,16 +180,16 @@ TEST_F(BakeVolume, AStretchedOrShearedGridLetsThroughWhatOpenVdbSays) {
 
 TEST_F(BakeVolume, OnlyTheChannelsThatAreNeededAreStored) {
   SourceVolume volume = test::make_volume(ivec3(40), 1, cloud);
-  const LevelData grey = pack_source_fog(volume).value();
+  const FogLevel grey = pack_source_fog(volume).value();
   EXPECT_TRUE(grey.voxel_albedo.empty() && grey.voxel_self_shadowing.empty() && grey.voxel_sggx.empty() &&
               grey.voxel_anisotropy.empty());
-  const LevelData white = pack_fog(volume, 2, Downsampling::Iso).value();
+  const FogLevel white = pack_fog(volume, 2, Downsampling::Iso).value();
   EXPECT_TRUE(white.voxel_albedo.empty() && white.voxel_self_shadowing.empty());
   volume.albedo = vec3(0.5f);
-  const LevelData darker = pack_fog(volume, 2, Downsampling::Iso).value();
+  const FogLevel darker = pack_fog(volume, 2, Downsampling::Iso).value();
   EXPECT_EQ(darker.voxel_self_shadowing.size(), voxel_count(darker));
   EXPECT_TRUE(darker.voxel_albedo.empty());
-  const LevelData shaped = pack_fog(volume, 2, Downsampling::Aniso).value();
+  const FogLevel shaped = pack_fog(volume, 2, Downsampling::Aniso).value();
   EXPECT_EQ(shaped.voxel_sggx.size(), voxel_count(shaped));
   EXPECT_EQ(pack_fog(volume, 2, Downsampling::Matched).value().voxel_anisotropy.empty(), false);
   volume.albedos.resize(volume.bricks.size());
@@ -209,7 +209,7 @@ TEST_F(BakeVolume, CoarserLevelsOfFlakesAreFlakes) {
   volume.self_shadowing.assign(volume.bricks.size(), NumberBrick());
   for (NumberBrick& brick : volume.self_shadowing) brick.fill(0.5f);
   for (const Downsampling method : {Downsampling::Linear, Downsampling::Matched}) {
-    const LevelData level = pack_fog(volume, 2, method).value();
+    const FogLevel level = pack_fog(volume, 2, method).value();
     EXPECT_EQ(level.header.medium, Medium::Flakes);
     EXPECT_EQ(level.header.hot_spot, 0.5f);
     ASSERT_EQ(voxel_count(level), 64u);
@@ -225,7 +225,7 @@ TEST_F(BakeVolume, CoarserLevelsOfFlakesAreFlakes) {
 
 TEST_F(BakeVolume, DensitiesKeepTheirSums) {
   const SourceVolume volume = test::make_volume(ivec3(8), 1, [](const ivec3& v) { return v == ivec3(7) ? 255 : 0.3; });
-  const LevelData level = pack_source_fog(volume).value();
+  const FogLevel level = pack_source_fog(volume).value();
   double sum = 0;
   for (const uint8_t density : level.bricks[0].density) sum += density;
   EXPECT_NEAR(sum, 511 * 0.3 + 255, 0.6);  // each alone would be nothing

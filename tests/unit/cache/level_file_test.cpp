@@ -13,6 +13,7 @@
 #include <fstream>
 #include <functional>
 
+#include "base/file_io.h"
 #include "base/hash.h"
 #include "base/random.h"
 #include "cache/level_format.h"
@@ -173,7 +174,7 @@ TEST(LevelFile, AFileOfAnotherSizeOrContentIsNotTheKnownOne) {
   const auto path = folder.path() / "a.ffl";
   const Result<uint64_t> bytes = write_level(path, test::random_level(6, 50, 10));
   ASSERT_TRUE(bytes);
-  const uint64_t hash = *hash_level_file(path);
+  const uint64_t hash = *hash_file(path);
   EXPECT_TRUE(LevelFile::open_known(path, *bytes, hash));
   const auto refusal = [&](uint64_t file_bytes, uint64_t file_hash) {
     const auto file = LevelFile::open_known(path, file_bytes, file_hash);

@@ -3,11 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "base/parallel.h"
 #include "prefilter/fog_shape.h"
 #include "prefilter/isotropic_lines.h"
+#include "prefilter/layer_walk.h"
+#include "prefilter/match_fog.h"
 #include "scattering/albedo.h"
 #include "scattering/carlson.h"
 #include "scattering/sggx.h"
@@ -294,6 +297,69 @@ TEST(MatchedFog, DoesNotDependOnThreads) {
     grids.push_back(matched_densities(source, 3).value());
   }
   EXPECT_EQ(grids[0].bricks, grids[1].bricks);
+}
+
+TEST(MatchedFog, DoesNotDependOnWhatIsInMemoryAtATime) {
+  SourceVolume source = filaments();
+  add_fibres(source, true);
+  for (const uint32_t level : {1u, 2u}) {
+    DensityGrid whole;
+    for (const uint64_t region_bytes : {uint64_t{1} << 40, uint64_t{300000}, uint64_t{1}}) {
+      DensityGrid grid = downsampled(source, level, Downsampling::Transp);
+      grid.shapes.assign(grid.bricks.size(), source.shapes[0]);
+      ASSERT_TRUE(match_fog(source, level, grid, {}, region_bytes));
+      if (whole.bricks.empty())
+        whole = grid;
+      else
+        EXPECT_EQ(grid.bricks, whole.bricks) << level << ' ' << region_bytes;
+    }
+  }
+}
+
+// The voxels of a level reach beyond a source whose sides are no multiples of them; lines that start there meet
+// nothing before the source.
+TEST(MatchedFog, WhatIsBeyondTheSourceIsEmpty) {
+  const SourceVolume source = make_volume(ivec3(40), 0.1, [](const ivec3&) { return 2; });
+  for (const uint32_t level : {4u, 5u}) {
+    const auto matched = matched_densities(source, level);
+    ASSERT_TRUE(matched);
+    EXPECT_LT(std::abs(line_errors(source, level, *matched).mean), 0.01) << level;
+  }
+}
+
+// ---- layers of cells
+
+/// What a walk says, with the ends of the first and the last cell of each stretch of layers as they are.
+std::vector<std::array<double, 5>> walked(const VoxelRay& ray, const ivec3& dims, const std::vector<int>& walls) {
+  std::vector<std::array<double, 5>> all;
+  for (size_t i = 0; i + 1 < walls.size(); ++i)
+    walk_layers(ray, 8, dims, {walls[i], walls[i + 1]}, [&](const ivec3& cell, double enter, double leave) {
+      all.push_back({double(cell.x), double(cell.y), double(cell.z), enter, leave});
+    });
+  return all;
+}
+
+TEST(LayerWalk, LayersOneAfterTheOtherAreAllOfThem) {
+  const ivec3 dims(7, 5, 9);
+  const VoxelBox box{dvec3(-3.0), dvec3(60.0, 41.0, 80.0)};  // larger than the lattice
+  for (uint64_t i = 0; i < 3000; ++i) {
+    VoxelRay ray = upwards(isotropic_line(box, even_coordinates(i, 7)));
+    if (i % 5 == 0) ray.direction = {i % 2 == 0 ? 1 : 0, i % 2, 0};   // within a layer
+    if (i % 7 == 0) ray.origin = glm::round(ray.origin / 8.0) * 8.0;  // through edges and corners
+    if (i % 11 == 0) ray.direction = glm::normalize(dvec3(int(i % 3) - 1, 1, 1));
+    const auto all = walked(ray, dims, {0, 9});
+    EXPECT_EQ(all, walked(ray, dims, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9})) << i;
+    EXPECT_EQ(all, walked(ray, dims, {0, 4, 9})) << i;
+    for (size_t n = 0; n < all.size(); ++n) {
+      EXPECT_LT(all[n][3], all[n][4]);
+      EXPECT_EQ(n == 0 ? all[0][3] : all[n - 1][4], all[n][3]);
+      const dvec3 middle = ray.origin + 0.5 * (all[n][3] + all[n][4]) * ray.direction;
+      for (int a = 0; a < 3; ++a) {
+        EXPECT_GE(middle[a], 8 * all[n][size_t(a)] - 1e-9);
+        EXPECT_LE(middle[a], 8 * all[n][size_t(a)] + 8 + 1e-9);
+      }
+    }
+  }
 }
 
 TEST(Downsampling, NamesAreRead) {
