@@ -316,17 +316,6 @@ TEST(MatchedFog, DoesNotDependOnWhatIsInMemoryAtATime) {
   }
 }
 
-// The voxels of a level reach beyond a source whose sides are no multiples of them; lines that start there meet
-// nothing before the source.
-TEST(MatchedFog, WhatIsBeyondTheSourceIsEmpty) {
-  const SourceVolume source = make_volume(ivec3(40), 0.1, [](const ivec3&) { return 2; });
-  for (const uint32_t level : {4u, 5u}) {
-    const auto matched = matched_densities(source, level);
-    ASSERT_TRUE(matched);
-    EXPECT_LT(std::abs(line_errors(source, level, *matched).mean), 0.01) << level;
-  }
-}
-
 // ---- layers of cells
 
 /// What a walk says, with the ends of the first and the last cell of each stretch of layers as they are.
