@@ -10,7 +10,9 @@ namespace farfield {
 
 float path_number(const RayContext& context, const EmbreeRay& ray, float cell, uint64_t salt) {
   const vec3 at = vec3(ray.org_x, ray.org_y, ray.org_z) + ray.tfar * vec3(ray.dir_x, ray.dir_y, ray.dir_z);
-  const vec3 cube = glm::floor(at / cell);
+  // Planes lie at round numbers: were cubes' sides there, rounding would decide which of two a hit is in.
+  constexpr float kOffset = 0.3819660f;
+  const vec3 cube = glm::floor(at / cell + kOffset);
   uint64_t bits = context.path_seed ^ salt;
   for (int axis = 0; axis < 3; ++axis) bits = mix64(bits, std::bit_cast<uint32_t>(cube[axis] + 0.0f));
   return to_unit_float(bits);
