@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes the generated assets of docs/results/fidelity.md, each of a kind that levels of detail get wrong easily.
 
-Usage: scripts/make_fidelity_assets.py FOLDER [NAME...]     without names: all
+Usage: scripts/make_fidelity_assets.py FOLDER [--turned] [NAME...]     without names: all
+
+--turned: every tube is turned about its axis by a random angle; without it all tubes along a direction have the same few normals.
 """
 import json
 import math
@@ -14,6 +16,7 @@ from pathlib import Path
 
 class Mesh:
     """Vertices and faces by material; written as .glb."""
+    turns = None  # of tubes about their axes, random numbers
 
     def __init__(self):
         self.points, self.faces = [], []
@@ -34,12 +37,14 @@ class Mesh:
     def tube(self, path, radius, material, sides=6):
         """Along points; radius: a number, or a function of the place in [0, 1]. Open at its ends."""
         points, faces = [], []
+        turn = self.turns.uniform(0, 2 * math.pi) if self.turns else 0.0
         for i, p in enumerate(path):
             along = normalized(sub(path[min(i + 1, len(path) - 1)], path[max(i - 1, 0)]))
             u, v = frame(along)
             r = radius(i / (len(path) - 1)) if callable(radius) else radius
             for k in range(sides):
-                c, s = math.cos(2 * math.pi * k / sides) * r, math.sin(2 * math.pi * k / sides) * r
+                angle = turn + 2 * math.pi * k / sides
+                c, s = math.cos(angle) * r, math.sin(angle) * r
                 points.append(tuple(p[j] + c * u[j] + s * v[j] for j in range(3)))
         for i in range(len(path) - 1):
             for k in range(sides):
@@ -260,12 +265,13 @@ ASSETS = {"planks_00": lambda: planks(0), "planks_02": lambda: planks(0.02), "pl
 def main():
     if len(sys.argv) < 2 or sys.argv[1].startswith("-"):
         sys.exit(__doc__)
-    folder, names = Path(sys.argv[1]), sys.argv[2:] or list(ASSETS)
+    folder, names = Path(sys.argv[1]), [name for name in sys.argv[2:] if name != "--turned"] or list(ASSETS)
     unknown = [name for name in names if name not in ASSETS]
     if unknown:
         sys.exit("make_fidelity_assets: no asset %s; there are %s" % (", ".join(unknown), ", ".join(ASSETS)))
     folder.mkdir(parents=True, exist_ok=True)
     for name in names:
+        Mesh.turns = random.Random(1) if "--turned" in sys.argv else None
         mesh = ASSETS[name]()
         mesh.write(folder / (name + ".glb"), MATERIALS)
         print("%s: %d faces" % (folder / (name + ".glb"), len(mesh.faces)))
