@@ -123,9 +123,9 @@ Result<FogLevel> pack_bricks(const SourceVolume& source, const ivec3& dims, doub
     const size_t count = std::min(kBatch, entries - first);
     parallel_for(count, 8, [&](size_t begin, size_t end) {
       const auto voxels = std::make_unique<FogVoxels>();
+      if (is_much_in_memory()) rest(source);
       for (size_t i = begin; i < end; ++i) {
         batch[i] = PackedFog();
-        if (is_much_in_memory()) rest(source);
         if (job.is_cancelled() || !voxels_of(brick_coordinates(level.header, first + i), *voxels)) continue;
         batch[i] = pack_brick(*voxels, source.flakes.has_value());
       }
@@ -188,15 +188,6 @@ FogVoxel source_voxel(const SourceVolume& source, uint32_t brick, size_t i) {
 }
 
 }  // namespace
-
-LevelView view_of(const FogLevel& level) {
-  LevelView view;
-  view.header = level.header;
-#define FARFIELD_VIEW(id, Name, field, Element, Group) view.field = level.field;
-  FARFIELD_LEVEL_ARRAYS(FARFIELD_VIEW)
-#undef FARFIELD_VIEW
-  return view;
-}
 
 Result<FogLevel> pack_source_fog(const SourceVolume& source, const Job& job) {
   const bool is_fog = !source.flakes;

@@ -16,8 +16,6 @@ namespace farfield {
 struct FogLevel : LevelArrays<BigVector> {
   LevelHeader header;
 };
-/// Valid while the level lives.
-LevelView view_of(const FogLevel& level);
 
 /// The level of a source as it is: level 0. Densities become bytes per brick; what rounding takes from a voxel the
 /// next ones along x get back, so that sums along rays stay. A voxel of less than half a step may become empty.

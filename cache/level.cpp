@@ -137,15 +137,6 @@ vec3 unpack_normal(PackedNormal normal) {
   return glm::normalize(n);
 }
 
-LevelView view_of(const LevelData& level) {
-  LevelView view;
-  view.header = level.header;
-#define FARFIELD_VIEW(id, Name, field, Element, Group) view.field = level.field;
-  FARFIELD_LEVEL_ARRAYS(FARFIELD_VIEW)
-#undef FARFIELD_VIEW
-  return view;
-}
-
 LevelData copy_of(const LevelView& level) {
   LevelData data;
   data.header = level.header;

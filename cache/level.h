@@ -259,7 +259,16 @@ struct LevelData : LevelArrays<OwnedArray> {
 struct LevelView : LevelArrays<ArrayView> {
   LevelHeader header;
 };
-LevelView view_of(const LevelData& level);
+/// Level: owns its arrays, of whatever kind, and has a header.
+template <typename Level>
+LevelView view_of(const Level& level) {
+  LevelView view;
+  view.header = level.header;
+#define FARFIELD_VIEW(id, Name, field, Element, Group) view.field = level.field;
+  FARFIELD_LEVEL_ARRAYS(FARFIELD_VIEW)
+#undef FARFIELD_VIEW
+  return view;
+}
 LevelData copy_of(const LevelView& level);
 
 /// What a level costs a host, as the manifest records it.

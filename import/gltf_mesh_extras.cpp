@@ -3,9 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
-
 #include "base/text.h"
+#include "import/gltf_extras.h"
 
 namespace farfield {
 namespace {
@@ -13,13 +12,9 @@ namespace {
 constexpr const char* kScheme = "farfield_subdivision";
 constexpr const char* kMesh = "farfield_mesh";
 
-tl::unexpected<Error> bad(const char* key, const std::string& what) {
-  return make_error(ErrorCode::BadFile, fmt::format("extras {}: {}", key, what));
-}
-
 Result<SubdivisionScheme> to_scheme(const tinygltf::Value& value, const char* key) {
   const auto scheme = parse_subdivision_scheme(value.IsString() ? value.Get<std::string>() : "");
-  if (!scheme) return bad(key, scheme.error().message);
+  if (!scheme) return bad_extras(key, scheme.error().message);
   return *scheme;
 }
 
@@ -30,7 +25,7 @@ Result<void> read_property(const tinygltf::Value& extras, const std::string& key
     FARFIELD_TRY_LET(mesh.scheme, to_scheme(value, kMesh));
     return {};
   }
-  return bad(kMesh, fmt::format("\"{}\" is unknown or of the wrong type; file and subdivision are read", key));
+  return bad_extras(kMesh, fmt::format("\"{}\" is unknown or of the wrong type; file and subdivision are read", key));
 }
 
 /// Also with ".gz" behind it.
@@ -48,19 +43,8 @@ Result<std::optional<SubdivisionScheme>> scheme_of_extras(const tinygltf::Mesh& 
 }
 
 Result<std::optional<NamedMesh>> mesh_of_extras(const tinygltf::Node& node) {
-  if (!node.extras.IsObject() || !node.extras.Has(kMesh)) return std::nullopt;
-  const tinygltf::Value& extras = node.extras.Get(kMesh);
-  NamedMesh mesh;
-  if (extras.IsString()) {
-    mesh.file = extras.Get<std::string>();
-  } else if (extras.IsObject()) {
-    for (const std::string& key : extras.Keys()) FARFIELD_TRY(read_property(extras, key, mesh));
-  }
-  if (mesh.file.empty()) return bad(kMesh, "names no file");
-  if (std::filesystem::path(mesh.file).is_absolute()) {
-    return bad(kMesh, "its file must be relative to the scene's folder");
-  }
-  if (!is_model(mesh.file)) return bad(kMesh, fmt::format("{} is neither OBJ nor PLY", mesh.file));
+  FARFIELD_TRY_LET(auto mesh, file_of_extras<NamedMesh>(node, kMesh, read_property));
+  if (mesh && !is_model(mesh->file)) return bad_extras(kMesh, fmt::format("{} is neither OBJ nor PLY", mesh->file));
   return mesh;
 }
 

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/check.h"
+#include "import/texels.h"
 
 namespace farfield {
 namespace {
@@ -14,11 +15,6 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 size_t index_of(int x, int y, int width) {
   return static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
-}
-
-/// How much of input texel `i` lies in [begin, end).
-double overlap(int i, double begin, double end) {
-  return std::max(0.0, std::min(i + 1.0, end) - std::max(1.0 * i, begin));
 }
 
 /// A coordinate folded into where the image is looked up; then it is small enough for an integer.
@@ -34,11 +30,6 @@ double folded(double x, Wrap wrap) {
       break;
   }
   return std::clamp(x, 0.0, 1.0);
-}
-
-/// A texel beside the image; mirroring repeats the border's, as clamping does.
-int neighbour(int i, int size, Wrap wrap) {
-  return wrap == Wrap::Repeat ? (i + size) % size : std::clamp(i, 0, size - 1);
 }
 
 }  // namespace
@@ -59,25 +50,20 @@ HeightMap::HeightMap(int width, int height, std::vector<float> values) {
   most_ = *most;
 }
 
-/// Each value is the mean of what is finite in the area that it covers, exactly also for odd sizes; none: NaN.
+/// Each value is the mean of what is finite in the area that it covers; none: NaN.
 HeightMap::Level HeightMap::half_size(const Level& in) {
-  Level out{std::max(1, in.width / 2), std::max(1, in.height / 2), {}};
-  const double step_x = static_cast<double>(in.width) / out.width, step_y = static_cast<double>(in.height) / out.height;
+  const ImageSize size{in.width, in.height}, half = half_of(size);
+  Level out{half.width, half.height, {}};
   for (int y = 0; y < out.height; ++y) {
-    const double y0 = y * step_y, y1 = y0 + step_y;
     for (int x = 0; x < out.width; ++x) {
-      const double x0 = x * step_x, x1 = x0 + step_x;
-      double sum = 0, weight = 0;
-      for (int v = static_cast<int>(y0); v < in.height && v < y1; ++v) {
-        for (int u = static_cast<int>(x0); u < in.width && u < x1; ++u) {
-          const float value = in.values[index_of(u, v, in.width)];
-          if (std::isnan(value)) continue;
-          const double w = overlap(u, x0, x1) * overlap(v, y0, y1);
-          sum += w * value;
-          weight += w;
-        }
-      }
-      out.values.push_back(weight > 0 ? static_cast<float>(sum / weight) : kNone);
+      double sum = 0, area = 0;
+      for_each_covered_texel<double>(size, x, y, [&](int u, int v, double covered) {
+        const float value = in.values[index_of(u, v, in.width)];
+        if (std::isnan(value)) return;
+        sum += covered * value;
+        area += covered;
+      });
+      out.values.push_back(area > 0 ? static_cast<float>(sum / area) : kNone);
     }
   }
   return out;
@@ -107,8 +93,8 @@ float HeightMap::look_up(const Level& level, const vec2& uv, Wrap wrap_u, Wrap w
   const double x = folded(uv.x, wrap_u) * level.width - 0.5, y = folded(uv.y, wrap_v) * level.height - 0.5;
   const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
   const auto value = [&](int column, int row) {
-    return level
-        .values[index_of(neighbour(column, level.width, wrap_u), neighbour(row, level.height, wrap_v), level.width)];
+    return level.values[index_of(wrapped_texel(column, level.width, wrap_u), wrapped_texel(row, level.height, wrap_v),
+                                 level.width)];
   };
   const double s = x - x0, t = y - y0;
   const double upper = (1 - s) * value(x0, y0) + s * value(x0 + 1, y0);

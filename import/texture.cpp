@@ -5,40 +5,27 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "import/texels.h"
 
 namespace farfield {
 namespace {
 
-/// How much of input texel `i` lies in [begin, end), for the box filter of one axis.
-float overlap(int i, float begin, float end) {
-  return std::max(0.0f, std::min(static_cast<float>(i + 1), end) - std::max(static_cast<float>(i), begin));
-}
-
-/// Half the size (rounded down, at least 1). Each output texel is the exact mean of the area it covers, also for odd
-/// sizes, so the last level is the exact mean of the image.
+/// Each output texel is the mean of the area it covers, so the last level is the exact mean of the image.
 Texture::Level half_size(const Texture::Level& in) {
-  Texture::Level out;
-  out.width = std::max(1, in.width / 2);
-  out.height = std::max(1, in.height / 2);
-  out.texels.resize(static_cast<size_t>(out.width) * static_cast<size_t>(out.height));
-  const float step_x = static_cast<float>(in.width) / static_cast<float>(out.width);
-  const float step_y = static_cast<float>(in.height) / static_cast<float>(out.height);
+  const ImageSize size{in.width, in.height}, half = half_of(size);
+  Texture::Level out{half.width, half.height, {}};
+  out.texels.reserve(static_cast<size_t>(out.width) * static_cast<size_t>(out.height));
   for (int y = 0; y < out.height; ++y) {
-    const float y0 = static_cast<float>(y) * step_y, y1 = y0 + step_y;
     for (int x = 0; x < out.width; ++x) {
-      const float x0 = static_cast<float>(x) * step_x, x1 = x0 + step_x;
       vec4 sum(0.0f);
-      float weight = 0;
-      for (int v = static_cast<int>(y0); v < in.height && static_cast<float>(v) < y1; ++v) {
-        for (int u = static_cast<int>(x0); u < in.width && static_cast<float>(u) < x1; ++u) {
-          const float w = overlap(u, x0, x1) * overlap(v, y0, y1);
-          const auto& t = in.texels[static_cast<size_t>(v) * static_cast<size_t>(in.width) + static_cast<size_t>(u)];
-          sum += w * vec4(t[0], t[1], t[2], t[3]);
-          weight += w;
-        }
-      }
-      auto& t = out.texels[static_cast<size_t>(y) * static_cast<size_t>(out.width) + static_cast<size_t>(x)];
-      for (int c = 0; c < 4; ++c) t[static_cast<size_t>(c)] = static_cast<uint16_t>(std::lround(sum[c] / weight));
+      float area = 0;
+      for_each_covered_texel<float>(size, x, y, [&](int u, int v, float covered) {
+        const auto& t = in.texels[static_cast<size_t>(v) * static_cast<size_t>(in.width) + static_cast<size_t>(u)];
+        sum += covered * vec4(t[0], t[1], t[2], t[3]);
+        area += covered;
+      });
+      auto& t = out.texels.emplace_back();
+      for (int c = 0; c < 4; ++c) t[static_cast<size_t>(c)] = static_cast<uint16_t>(std::lround(sum[c] / area));
     }
   }
   return out;

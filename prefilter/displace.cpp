@@ -6,6 +6,7 @@
 #include <span>
 
 #include "base/parallel.h"
+#include "prefilter/vertex_stars.h"
 
 namespace farfield {
 namespace {
@@ -17,27 +18,20 @@ constexpr double kLeastEigenvalue = 0.1;
 constexpr double kSameNormal = 1 - 1e-9;  // cosine, up to rounding
 constexpr double kSmoothCosine = 0.999;   // 2.6 degrees: normals of files that are smooth there
 
-/// Corners by their vertex, and faces by their corner.
-struct Neighbours {
-  std::vector<uint32_t> begin;   ///< per vertex, and one more
-  std::vector<uint32_t> corner;  ///< those of vertex v: corner[begin[v]] .. corner[begin[v + 1] - 1]
-  std::vector<uint32_t> face;    ///< per corner
+/// Corners by their vertex.
+VertexStars corners_by_vertex(const SourceMesh& mesh) {
+  return VertexStars(mesh.positions.size(), mesh.corner_count(),
+                     [&](uint32_t corner, const auto& visit) { visit(mesh.corner_position[corner]); });
+}
 
-  explicit Neighbours(const SourceMesh& mesh) : begin(mesh.positions.size() + 1, 0), corner(mesh.corner_count()) {
-    for (const uint32_t v : mesh.corner_position) ++begin[v + 1];
-    for (size_t v = 1; v < begin.size(); ++v) begin[v] += begin[v - 1];
-    std::vector<uint32_t> next = begin;
-    for (uint32_t i = 0; i < corner.size(); ++i) corner[next[mesh.corner_position[i]]++] = i;
-    face.resize(corner.size());
-    for (uint32_t f = 0; f < mesh.face_count(); ++f) {
-      std::fill(face.begin() + mesh.face_begin[f], face.begin() + mesh.face_begin[f + 1], f);
-    }
+/// Faces by their corner.
+std::vector<uint32_t> faces_by_corner(const SourceMesh& mesh) {
+  std::vector<uint32_t> face(mesh.corner_count());
+  for (uint32_t f = 0; f < mesh.face_count(); ++f) {
+    std::fill(face.begin() + mesh.face_begin[f], face.begin() + mesh.face_begin[f + 1], f);
   }
-
-  std::span<const uint32_t> around(size_t vertex) const {
-    return {corner.data() + begin[vertex], corner.data() + begin[vertex + 1]};
-  }
-};
+  return face;
+}
 
 /// Turns m into a diagonal matrix by Jacobi's rotations; columns of the result are its eigenvectors.
 glm::dmat3 diagonalise(glm::dmat3& m) {
@@ -74,7 +68,11 @@ dvec3 place_above(const glm::dmat3& mean_nn, const dvec3& mean_hn) {
 class Displacer {
  public:
   Displacer(SourceMesh& mesh, const std::vector<float>& height)
-      : mesh_(mesh), height_(height), neighbours_(mesh), before_(mesh.positions) {}
+      : mesh_(mesh),
+        height_(height),
+        corners_(corners_by_vertex(mesh)),
+        face_(faces_by_corner(mesh)),
+        before_(mesh.positions) {}
 
   void run() {
     parallel_for(before_.size(), kGrain, [&](size_t begin, size_t end) {
@@ -90,13 +88,15 @@ class Displacer {
   }
 
  private:
+  std::span<const uint32_t> around(size_t vertex) const { return corners_.of(static_cast<uint32_t>(vertex)); }
+
   dvec3 offset_of(size_t vertex) const {
     glm::dmat3 nn(0.0);
     dvec3 hn(0.0), first(0.0);
     double height = 0;
     int count = 0;
     bool is_smooth = true;
-    for (const uint32_t corner : neighbours_.around(vertex)) {
+    for (const uint32_t corner : around(vertex)) {
       const dvec3 n(mesh_.corner_normal[corner]);
       if (n == dvec3(0.0)) continue;
       if (count++ == 0) first = n;
@@ -112,8 +112,8 @@ class Displacer {
 
   /// Whether a face at the vertex has changed.
   bool is_touched(size_t vertex) const {
-    return std::ranges::any_of(neighbours_.around(vertex), [&](uint32_t corner) {
-      const uint32_t face = neighbours_.face[corner];
+    return std::ranges::any_of(around(vertex), [&](uint32_t corner) {
+      const uint32_t face = face_[corner];
       for (uint32_t i = mesh_.face_begin[face]; i < mesh_.face_begin[face + 1]; ++i) {
         if (const uint32_t v = mesh_.corner_position[i]; before_[v] != mesh_.positions[v]) return true;
       }
@@ -123,10 +123,10 @@ class Displacer {
 
   /// By as much as the faces around have turned: what the given normals know beyond the faces stays.
   void turn_normals(size_t vertex, std::vector<vec3>& out) const {
-    for (const uint32_t corner : neighbours_.around(vertex)) {
+    for (const uint32_t corner : around(vertex)) {
       const dvec3 n(mesh_.corner_normal[corner]);
       dvec3 from(0.0), to(0.0);
-      for (const uint32_t other : neighbours_.around(vertex)) {
+      for (const uint32_t other : around(vertex)) {
         if (glm::dot(dvec3(mesh_.corner_normal[other]), n) < kSmoothCosine) continue;
         from += wedge(before_, other);
         to += wedge(mesh_.positions, other);
@@ -146,7 +146,7 @@ class Displacer {
 
   /// The normal of a face at a corner, as long as the angle there.
   dvec3 wedge(const std::vector<dvec3>& positions, uint32_t corner) const {
-    const uint32_t face = neighbours_.face[corner], begin = mesh_.face_begin[face], end = mesh_.face_begin[face + 1];
+    const uint32_t face = face_[corner], begin = mesh_.face_begin[face], end = mesh_.face_begin[face + 1];
     const auto position = [&](uint32_t i) { return positions[mesh_.corner_position[i]]; };
     const dvec3 at = position(corner);
     const dvec3 next = position(corner + 1 == end ? begin : corner + 1) - at;
@@ -158,7 +158,8 @@ class Displacer {
 
   SourceMesh& mesh_;
   const std::vector<float>& height_;
-  const Neighbours neighbours_;
+  const VertexStars corners_;
+  const std::vector<uint32_t> face_;  ///< per corner
   const std::vector<dvec3> before_;
 };
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "import/texels.h"
+
 namespace farfield {
 namespace {
 
@@ -12,22 +14,9 @@ namespace {
 constexpr double kMaxTexels = 2048;
 constexpr int kLineSamples = 32;  // along a triangle without area
 
-int wrap(int i, int size, Wrap mode) {
-  switch (mode) {
-    case Wrap::Clamp:
-      return std::clamp(i, 0, size - 1);
-    case Wrap::Mirror: {
-      const int period = 2 * size, k = ((i % period) + period) % period;
-      return k < size ? k : period - 1 - k;
-    }
-    case Wrap::Repeat:
-      break;
-  }
-  return ((i % size) + size) % size;
-}
-
 vec4 fetch(const SourceTexture& texture, const Texture::Level& level, int x, int y) {
-  return texture.image->texel(level, wrap(x, level.width, texture.wrap_u), wrap(y, level.height, texture.wrap_v));
+  return texture.image->texel(level, wrapped_texel(x, level.width, texture.wrap_u),
+                              wrapped_texel(y, level.height, texture.wrap_v));
 }
 
 vec4 sample_bilinear(const SourceTexture& texture, const Texture::Level& level, vec2 uv) {

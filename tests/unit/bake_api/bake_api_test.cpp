@@ -327,13 +327,24 @@ struct Cube {
   }
 };
 
-TEST(BakeApiCage, IsBakedSmooth) {
-  const Cube cube;
-  const test::TemporaryFolder folder;
-  const std::string out = (folder.path() / "cube.farfield").string();
+/// For level 0 alone.
+BakeSettings source_only() {
   BakeSettings settings;
   settings.finest_grid = 32;
   settings.source_only = true;
+  return settings;
+}
+
+/// A cube, and where it is baked.
+class BakeApiCage : public ::testing::Test {
+ protected:
+  const Cube cube;
+  const test::TemporaryFolder folder;
+  const std::string out = (folder.path() / "cube.farfield").string();
+};
+
+TEST_F(BakeApiCage, IsBakedSmooth) {
+  BakeSettings settings = source_only();
   const auto flat = bake_meshes(cube.input(false), out, settings);
   ASSERT_TRUE(flat) << flat.error().message;
   EXPECT_EQ(flat->levels[0].triangles, 12u);
@@ -353,10 +364,7 @@ TEST(BakeApiCage, IsBakedSmooth) {
   EXPECT_LT(coarse->levels[0].triangles, creased->levels[0].triangles);
 }
 
-TEST(BakeApiCage, IsSimplifiedAsTheSettingsSay) {
-  const Cube cube;
-  const test::TemporaryFolder folder;
-  const std::string out = (folder.path() / "cube.farfield").string();
+TEST_F(BakeApiCage, IsSimplifiedAsTheSettingsSay) {
   BakeSettings settings;
   settings.finest_grid = 32;
   settings.coarsest_grid = 16;
@@ -377,10 +385,7 @@ TEST(BakeApiCage, IsSimplifiedAsTheSettingsSay) {
   EXPECT_EQ(code_of(bake_meshes(cube.input(false), out, settings)), ErrorCode::InvalidArgument);
 }
 
-TEST(BakeApiCage, RefusesSubdivisionsThatMakeNoSense) {
-  const Cube cube;
-  const test::TemporaryFolder folder;
-  const std::string out = (folder.path() / "cube.farfield").string();
+TEST_F(BakeApiCage, RefusesSubdivisionsThatMakeNoSense) {
   BakeSettings settings;
   settings.subdivision.scheme = BakeSubdivision::Scheme::Loop;  // of quads
   EXPECT_EQ(code_of(bake_meshes(cube.input(false), out, settings)), ErrorCode::InvalidArgument);
@@ -392,13 +397,8 @@ TEST(BakeApiCage, RefusesSubdivisionsThatMakeNoSense) {
   EXPECT_FALSE(fs::exists(out));
 }
 
-TEST(BakeApiCage, AMeshMayHaveASchemeOfItsOwn) {
-  const Cube cube;
-  const test::TemporaryFolder folder;
-  const std::string out = (folder.path() / "cube.farfield").string();
-  BakeSettings settings;
-  settings.finest_grid = 32;
-  settings.source_only = true;
+TEST_F(BakeApiCage, AMeshMayHaveASchemeOfItsOwn) {
+  BakeSettings settings = source_only();
   BakeInput input = cube.input(false);
   input.meshes.push_back(input.meshes[0]);
   glm::dmat4x3 beside(1.0);
@@ -460,9 +460,7 @@ TEST(BakeApiDisplacement, HeightsGrowWithInstancesAndAreKeptInTheHash) {
   EXPECT_EQ(source_from_input(input)->source_hash, before);
 
   const test::TemporaryFolder folder;
-  BakeSettings settings;
-  settings.finest_grid = 32;
-  settings.source_only = true;
+  BakeSettings settings = source_only();
   const auto baked = bake_meshes(input, (folder.path() / "quads.farfield").string(), settings);
   ASSERT_TRUE(baked) << baked.error().message;
   settings.subdivision.detail = -1;
