@@ -278,6 +278,16 @@ std::vector<double> EscapeMeasurement::ratios_through() const {
   return divided(odds(source_), odds(medium_));
 }
 
+/// What light of each channel is multiplied by that flakes of this albedo scatter, so that `share` in [1, 2] times as
+/// much of it gets away. Where all of it gets away at once (a resolved surface, share 2), or what is kept goes through
+/// half of the flakes that it meets and gets away behind them, the odds of the albedo are multiplied (odds_gain). What
+/// else is kept does not come back to where it is seen: the albedo itself is, but for white (docs/decisions/0033).
+vec3 escape_gain(const vec3& albedo, const vec3& through, float share) {
+  const vec3 power = 1.0f + (2.0f - share) * glm::max(1.0f - 2.0f * through, vec3(0.0f));
+  const vec3 kept = glm::pow(albedo, power);
+  return share / (vec3(1.0f) - kept + share * kept);
+}
+
 }  // namespace
 
 void let_through(double ratio, Voxel& voxel) {
@@ -317,7 +327,8 @@ void let_escape(double ratio, Voxel& voxel) {
   const auto share = static_cast<float>(std::clamp(ratio, kLeastEscape, kMostEscape));
   voxel.self_shadowing = std::min(share, 1.0f);
   if (!(share > 1)) return;
-  const vec3 gain = cluster_albedo(glm::min(albedo, vec3(1.0f)), share) / glm::max(albedo, vec3(1e-6f));
+  const vec3 through = voxel.transmission / glm::max(voxel.diffuse + voxel.transmission, vec3(1e-6f));
+  const vec3 gain = escape_gain(glm::min(albedo, vec3(1.0f)), through, share);
   voxel.diffuse *= gain;
   voxel.specular *= gain;
   voxel.transmission *= gain;

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "prefilter/measure_volume.h"
 #include "scattering/highlight.h"
 #include "scattering/highlight_lean.h"
@@ -37,7 +39,8 @@ TEST(LetEscape, ShadowsBelowOneAndBrightensAbove) {
   let_escape(1.5, smooth);
   EXPECT_EQ(smooth.self_shadowing, 1);
   EXPECT_NEAR(smooth.diffuse.x, 1, 1e-6f);
-  EXPECT_NEAR(smooth.diffuse.y, 1.5 * 0.3 / (0.7 + 1.5 * 0.3), 1e-6);
+  const double kept = std::pow(0.3, 1.5);
+  EXPECT_NEAR(smooth.diffuse.y, 1.5 * 0.3 / (1 - kept + 1.5 * kept), 1e-6);
   EXPECT_EQ(smooth.diffuse.z, 0);
 }
 
@@ -47,6 +50,31 @@ TEST(LetEscape, StaysWithinItsBounds) {
   EXPECT_NEAR(none.self_shadowing, kLeastEscape, 1e-6);
   let_escape(1e30, all);
   EXPECT_NEAR(all.diffuse.y, 2 * 0.3 / 1.3, 1e-6);
+}
+
+TEST(LetEscape, MultipliesTheOddsWhereHalfOrMoreGoesThrough) {
+  for (const float through : {0.5f, 0.75f, 1.0f}) {
+    Voxel leaf = grey();
+    leaf.diffuse = vec3(0.3f * (1 - through)), leaf.transmission = vec3(0.3f * through);
+    let_escape(1.5, leaf);
+    EXPECT_NEAR(leaf.diffuse.x + leaf.transmission.x, 1.5 * 0.3 / (0.7 + 1.5 * 0.3), 1e-6) << through;
+    EXPECT_NEAR(leaf.transmission.x, through * (leaf.diffuse.x + leaf.transmission.x), 1e-6) << through;
+  }
+}
+
+TEST(LetEscape, GainsLessTheMoreGoesThroughAndNeverMakesMoreThanWhite) {
+  for (const float albedo : {1e-6f, 0.3f, 0.9f, 1.0f}) {
+    float last = 1 + 1e-6f;
+    for (const float through : {0.0f, 0.1f, 0.3f, 0.5f}) {
+      Voxel leaf = grey();
+      leaf.diffuse = vec3(albedo * (1 - through)), leaf.transmission = vec3(albedo * through);
+      let_escape(1.2, leaf);
+      const float all = leaf.diffuse.x + leaf.transmission.x;
+      EXPECT_LE(all, last * (1 + 1e-5f)) << albedo << " " << through;
+      EXPECT_GE(all, albedo * (1 - 1e-5f)) << albedo << " " << through;
+      last = all;
+    }
+  }
 }
 
 TEST(LetThrough, MovesLightFromOneSideToTheOtherAndKeepsItsSum) {
