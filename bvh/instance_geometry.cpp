@@ -23,6 +23,7 @@
 #include "base/check.h"
 #include "base/float4.h"
 #include "base/hash.h"
+#include "base/just_behind.h"
 #include "bvh/traced_morph.h"
 
 namespace farfield {
@@ -340,7 +341,7 @@ bool InstanceGeometry::intersect_filtered(const Query& query, EmbreeRayHit& ray_
   while (intersect_once()) {
     is_accepted = query.does_host_accept(ray_hit);
     if (is_accepted) break;
-    const float behind = std::nextafter(ray_hit.ray.tfar, kInfinity);
+    const float behind = just_behind(ray_hit.ray.tnear, ray_hit.ray.tfar);
     ray_hit = before;
     if (record) *record = *record_before;
     if (!(behind < ray_hit.ray.tfar)) break;

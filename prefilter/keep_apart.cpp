@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "base/index.h"
+#include "base/just_behind.h"
 #include "base/parallel.h"
 #include "prefilter/ray_scene.h"
 #include "prefilter/surface_parts.h"
@@ -178,7 +178,7 @@ class Walls {
         return {part, towards, std::min(hit->distance, kRoom * resolution_)};
       }
       if (hit->distance > kTouching * resolution_) break;  // its own part is in between
-      near = std::nextafter(hit->distance, std::numeric_limits<float>::infinity());
+      near = just_behind(near, hit->distance);
     }
     return kNobody;
   }
@@ -217,7 +217,7 @@ class Walls {
       const bool is_other = part_[surface_.triangles[hit->triangle].x] == side.part;
       const auto off = [&](const RayHit& at) { return std::abs(at.distance - reach); };
       if (is_other && (!found || off(*hit) < off(*found))) found = hit;
-      near = std::nextafter(hit->distance, std::numeric_limits<float>::infinity());
+      near = just_behind(near, hit->distance);
     }
     if (!found || found->distance >= reach + 0.5f * side.room) return {};  // not to the last digit, or it would not end
     return Crossing{reach + side.room - found->distance, found->triangle};

@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
+
+#include "base/just_behind.h"
 
 namespace farfield {
 
@@ -60,7 +60,7 @@ std::optional<RayHit> OpacityScene::first_stop(const vec3& origin, const vec3& d
     const float opacity =
         face.sheet.is_sheet() ? face.stopped_share(glm::normalize(hit->normal), direction) : face.stopped_share();
     if (opacity >= 1 || to_unit_float(random.next()) < opacity) return hit;
-    near = std::nextafter(hit->distance, std::numeric_limits<float>::infinity());
+    near = just_behind(near, hit->distance);
   }
   return {};
 }
