@@ -482,6 +482,28 @@ TEST(InstanceGeometry, FiltersOfTheHostAreAskedAboutHitsAndRaysPassWhatTheyRefus
   }
 }
 
+// Embree may find the surface that was refused once more, an ulp in front of where the ray goes on.
+TEST(InstanceGeometry, RaysEndHoweverOftenTheHostRefuses) {
+  Stage stage;
+  const LevelData soup = test::triangle_soup(50, 0.5f, 1);
+  stage.add_instance(stage.add_asset({&soup}), mat4x3(glm::mat4(1.0f)));
+  const EmbreeSceneRef scene = stage.scene();
+  Rng rng(8);
+  int asked = 0;
+  for (uint32_t i = 0; i < 20'000; ++i) {
+    OnlyInstance filter;
+    filter.context = context_of(i);
+    filter.context.embree.filter = OnlyInstance::filter;
+    filter.wanted = Crowd::kInstances, filter.geometry = stage.geom_id;
+    const vec3 origin(rng.next(), rng.next(), rng.next());
+    EmbreeRayHit ray = make_ray_hit(origin, random_unit(rng), 0, std::numeric_limits<float>::infinity());
+    EXPECT_FALSE(trace_nearest(scene, filter.context.embree, ray));
+    EXPECT_LT(filter.asked, 100);  // 50 faces, few of them twice
+    asked += filter.asked;
+  }
+  EXPECT_GT(asked, 5'000);
+}
+
 TEST(InstanceGeometry, VolumesKeepTheirTransmittanceUnderAnyAffineTransform) {
   LevelData level = test::empty_level(0, 0.125f);
   const SymMat3 s = SymMat3::outer(glm::normalize(vec3(1, 2, 3))) + SymMat3::identity() * 0.05f;
