@@ -15,7 +15,9 @@
 #include "base/index.h"
 #include "base/parallel.h"
 #include "prefilter/edge_table.h"
+#include "prefilter/gentle_slopes.h"
 #include "prefilter/index_map.h"
+#include "prefilter/surface_patches.h"
 
 namespace farfield {
 
@@ -31,33 +33,6 @@ constexpr double kPatchRadius = 0.125;
 /// Explorations cross blocks of this fraction of the resolution in one step: the ball is wide against them, and they
 /// are wide against many faces.
 constexpr double kBlockRadius = 0.0625;
-
-/// Length of a triangle's longest edge over the height on it, above which the middle of that edge represents the
-/// triangle better than its centre of mass (thesis 7.2.2). The halves of a square have 2: both are judged from the
-/// square's middle, so that quads rarely fall apart. An equilateral triangle has 1.15.
-constexpr double kElongated = 1.5;
-
-constexpr int next_corner(int corner) { return corner == 2 ? 0 : corner + 1; }
-
-dvec3 corner_position(const Surface& surface, uint32_t face, int corner) {
-  return dvec3(surface.positions[surface.triangles[face][corner]]);
-}
-
-/// The point that stands for the face.
-dvec3 evaluation_point(const Surface& surface, uint32_t face) {
-  const std::array<dvec3, 3> p = {corner_position(surface, face, 0), corner_position(surface, face, 1),
-                                  corner_position(surface, face, 2)};
-  int longest = 0;
-  double longest2 = -1;
-  for (int c = 0; c < 3; ++c) {
-    const dvec3 edge = p[static_cast<size_t>(next_corner(c))] - p[static_cast<size_t>(c)];
-    if (glm::dot(edge, edge) > longest2) longest2 = glm::dot(edge, edge), longest = c;
-  }
-  const double twice_area = glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
-  const bool is_elongated = longest2 > kElongated * twice_area;
-  if (!is_elongated) return (p[0] + p[1] + p[2]) / 3.0;
-  return 0.5 * (p[static_cast<size_t>(longest)] + p[static_cast<size_t>(next_corner(longest))]);
-}
 
 /// Counts the connected components of a graph while nodes and links arrive.
 class ComponentCounter {
@@ -93,46 +68,6 @@ class ComponentCounter {
   std::vector<uint32_t> parent_;
   int components_ = 0;
 };
-
-/// A face that stands for those around it, and which faces those are.
-struct Patches {
-  std::vector<uint32_t> seeds;          ///< per patch
-  std::vector<uint32_t> patch_of_face;  ///< per face
-};
-
-/// Grows connected patches around seeds, in face order. Faces larger than a patch stay alone: the thesis's evaluation.
-Patches make_patches(const Surface& surface, const EdgeTable& edges, double radius) {
-  Patches patches;
-  patches.patch_of_face.assign(surface.triangles.size(), kNoIndex);
-  std::vector<uint32_t> front;
-  for (uint32_t seed = 0; seed < surface.triangles.size(); ++seed) {
-    if (patches.patch_of_face[seed] != kNoIndex) continue;
-    const uint32_t patch = static_cast<uint32_t>(patches.seeds.size());
-    patches.seeds.push_back(seed);
-    patches.patch_of_face[seed] = patch;
-    const dvec3 center = evaluation_point(surface, seed);
-    const auto is_near = [&](uint32_t face) {
-      for (int c = 0; c < 3; ++c) {
-        const dvec3 offset = corner_position(surface, face, c) - center;
-        if (!(glm::dot(offset, offset) <= radius * radius)) return false;
-      }
-      return true;
-    };
-    front.assign(1, seed);
-    while (!front.empty()) {
-      const uint32_t face = front.back();
-      front.pop_back();
-      for (int c = 0; c < 3; ++c) {
-        for (const uint32_t neighbour : edges.faces_of(edges.face_edges[face][c])) {
-          if (patches.patch_of_face[neighbour] != kNoIndex || !is_near(neighbour)) continue;
-          patches.patch_of_face[neighbour] = patch;
-          front.push_back(neighbour);
-        }
-      }
-    }
-  }
-  return patches;
-}
 
 /// A part of the surface that lies within a ball, and where it goes on.
 struct Blocks {
@@ -431,6 +366,7 @@ std::vector<uint8_t> classify_macrosurface(const Surface& surface, float resolut
   if (!(resolution > 0)) return std::vector<uint8_t>(surface.triangles.size(), 1);
   const EdgeTable edges = build_edge_table(surface.triangles, surface.positions.size());
   const Patches patches = make_patches(surface, edges, kPatchRadius * resolution);
+  const std::vector<uint8_t> is_gentle = find_gentle_faces(surface, edges, resolution, job);
   const Blocks blocks = make_blocks(surface, edges, kBlockRadius * resolution);
 
   std::vector<uint8_t> patch_is_macrosurface(patches.seeds.size());
@@ -438,7 +374,8 @@ std::vector<uint8_t> classify_macrosurface(const Surface& surface, float resolut
   parallel_for(patches.seeds.size(), grain, [&](size_t begin, size_t end) {
     BallExplorer explorer(surface, edges, blocks, resolution);
     for (size_t i = begin; i < end && !job.is_cancelled(); ++i) {
-      patch_is_macrosurface[i] = explorer.is_on_macrosurface(patches.seeds[i]);
+      const uint32_t seed = patches.seeds[i];
+      patch_is_macrosurface[i] = is_gentle[seed] || explorer.is_on_macrosurface(seed);
     }
   });
 
