@@ -2,10 +2,10 @@
 #include "prefilter/gentle_slopes.h"
 
 #include <algorithm>
-#include <array>
+#include <cmath>
+#include <utility>
 
 #include "base/parallel.h"
-#include "prefilter/surface_patches.h"
 
 namespace farfield {
 namespace {
@@ -14,120 +14,149 @@ namespace {
 /// but must be smooth farther out.
 constexpr double kPatchRadius = 0.5;
 
-/// Cosine of the angle between a normal and the axis: slopes are below 1 at 45 degrees.
-constexpr double kLeastCosine = 0.75;
+/// Between a normal and the axis, in radians: slopes are below 1 at 45 degrees.
+constexpr double kMostAngle = 0.72;
 
-/// Faces that one look around may visit.
-constexpr size_t kMostFaces = size_t{1} << 18;
+/// Blocks larger than this fraction of the resolution are explored without a look.
+constexpr double kLargeBlock = 0.5;
 
-std::vector<vec3> face_normals(const Surface& surface) {
-  std::vector<vec3> normals(surface.triangles.size());
-  for (uint32_t face = 0; face < normals.size(); ++face) {
-    const dvec3 a = corner_position(surface, face, 0);
-    normals[face] = vec3(glm::cross(corner_position(surface, face, 1) - a, corner_position(surface, face, 2) - a));
-  }
-  return normals;
-}
+/// How smooth a block is.
+struct Slope {
+  dvec3 normal{0.0};        ///< sum of its faces' area vectors, as they are turned
+  dvec3 direction{0.0};     ///< of it
+  double least_cosine = 2;  ///< between it and an axis to which all its normals are near; 2: none is
+};
 
-/// Looks around faces. Keeps its scratch memory between calls; one thread at a time.
-class SlopeExplorer {
+/// Sides of faces that agree across edges of two faces, as far as winding allows.
+class Sides {
  public:
-  SlopeExplorer(const Surface& surface, const EdgeTable& edges, const std::vector<vec3>& normals, double radius)
-      : surface_(surface), edges_(edges), normals_(normals), radius2_(radius * radius), visits_(normals.size()) {}
-
-  /// Whether all that is connected to the face within the radius around it is gentle.
-  bool is_gentle_around(uint32_t seed) {
-    center_ = evaluation_point(surface_, seed);
-    ++round_;
-    reached_.clear();
-    reach(seed, false);
-    dvec3 sum(0.0);
-    for (size_t i = 0; i < reached_.size(); ++i) {
-      const dvec3 normal = turned_normal(reached_[i]);
-      if (!(glm::dot(normal, dvec3(normals_[seed])) > 0)) return false;  // no axis is near to both
-      sum += normal;
-      if (reached_.size() > kMostFaces || !reach_neighbours(reached_[i])) return false;
+  Sides(const Surface& surface, const EdgeTable& edges)
+      : surface_(surface), edges_(edges), is_reached_(surface.triangles.size()), is_turned_(surface.triangles.size()) {
+    for (uint32_t face = 0; face < is_reached_.size(); ++face) {
+      if (!std::exchange(is_reached_[face], 1)) spread_from(face);
     }
-    const dvec3 axis = glm::normalize(sum);
-    return std::ranges::all_of(reached_, [&](uint32_t face) {
-      const dvec3 normal = turned_normal(face);
-      return glm::dot(normal, axis) >= kLeastCosine * glm::length(normal);
-    });
+  }
+
+  /// Area vector, twice as long as the area is large.
+  dvec3 normal(uint32_t face) const {
+    const dvec3 a = corner_position(surface_, face, 0);
+    const dvec3 normal = glm::cross(corner_position(surface_, face, 1) - a, corner_position(surface_, face, 2) - a);
+    return is_turned_[face] ? -normal : normal;
+  }
+
+  /// Whether two faces meet at the edge, and have the same side there.
+  bool agree_at(uint32_t edge) const {
+    const auto faces = edges_.faces_of(edge);
+    return faces.size() == 2 && runs_forward(faces[0], edge) != runs_forward(faces[1], edge);
   }
 
  private:
-  struct Visit {
-    uint32_t round = 0;      ///< in which the face was last reached
-    bool is_turned = false;  ///< against the seed, as winding goes
-  };
-
-  dvec3 turned_normal(uint32_t face) const {
-    return visits_[face].is_turned ? -dvec3(normals_[face]) : dvec3(normals_[face]);
-  }
-
-  /// False if it has been reached from its other side.
-  bool reach(uint32_t face, bool is_turned) {
-    Visit& visit = visits_[face];
-    if (visit.round == round_) return visit.is_turned == is_turned;
-    visit = {round_, is_turned};
-    reached_.push_back(face);
-    return true;
-  }
-
-  /// Through edges that touch the ball. False at borders and where more than two faces meet.
-  bool reach_neighbours(uint32_t face) {
-    std::array<dvec3, 3> from_center;
-    for (int c = 0; c < 3; ++c) from_center[static_cast<size_t>(c)] = corner_position(surface_, face, c) - center_;
-    for (int c = 0; c < 3; ++c) {
-      if (!touches_ball(from_center[static_cast<size_t>(c)], from_center[static_cast<size_t>(next_corner(c))]))
-        continue;
-      const uint32_t edge = edges_.face_edges[face][c];
-      const auto faces = edges_.faces_of(edge);
-      if (faces.size() != 2) return false;
-      const uint32_t other = faces[0] == face ? faces[1] : faces[0];
-      const bool turns = runs_forward(face, edge) == runs_forward(other, edge);
-      if (!reach(other, visits_[face].is_turned != turns)) return false;
+  void spread_from(uint32_t first) {
+    front_.assign(1, first);
+    while (!front_.empty()) {
+      const uint32_t face = front_.back();
+      front_.pop_back();
+      for (int c = 0; c < 3; ++c) {
+        const uint32_t edge = edges_.face_edges[face][c];
+        const auto faces = edges_.faces_of(edge);
+        if (faces.size() != 2) continue;
+        const uint32_t other = faces[0] == face ? faces[1] : faces[0];
+        if (std::exchange(is_reached_[other], 1)) continue;
+        is_turned_[other] = runs_forward(face, edge) == runs_forward(other, edge);
+        front_.push_back(other);
+      }
     }
-    return true;
   }
 
+  /// From the edge's smaller vertex to its larger one, on the face's side.
   bool runs_forward(uint32_t face, uint32_t edge) const {
     const uvec3& of_face = edges_.face_edges[face];
     const int corner = of_face.x == edge ? 0 : of_face.y == edge ? 1 : 2;
-    return surface_.triangles[face][corner] == edges_.smaller_vertex[edge];
-  }
-
-  /// Whether some of the edge from a to b, both from the centre, lies inside.
-  bool touches_ball(const dvec3& a, const dvec3& b) const {
-    const double a2 = glm::dot(a, a);
-    if (a2 <= radius2_ || glm::dot(b, b) <= radius2_) return true;
-    const dvec3 edge = b - a;
-    const double along = -glm::dot(a, edge), length2 = glm::dot(edge, edge);
-    return along > 0 && along < length2 && (a2 - radius2_) * length2 <= along * along;
+    return (surface_.triangles[face][corner] == edges_.smaller_vertex[edge]) != (is_turned_[face] != 0);
   }
 
   const Surface& surface_;
   const EdgeTable& edges_;
-  const std::vector<vec3>& normals_;
-  const double radius2_;
-  dvec3 center_{0.0};
-  uint32_t round_ = 0;         ///< counts calls
-  std::vector<Visit> visits_;  ///< per face
+  std::vector<uint8_t> is_reached_, is_turned_;
+  std::vector<uint32_t> front_;
+};
+
+std::vector<Slope> block_slopes(const Surface& surface, const EdgeTable& edges, const Blocks& blocks) {
+  const Sides sides(surface, edges);
+  std::vector<Slope> slopes(blocks.center.size());
+  for (uint32_t face = 0; face < surface.triangles.size(); ++face) {
+    slopes[blocks.block_of_face[face]].normal += sides.normal(face);
+  }
+  for (Slope& slope : slopes) slope.direction = glm::normalize(slope.normal);
+  std::vector<double> cosine(slopes.size(), 1);  // of the half angle of the cone around all its normals
+  for (uint32_t face = 0; face < surface.triangles.size(); ++face) {
+    const uint32_t block = blocks.block_of_face[face];
+    const dvec3 normal = glm::normalize(sides.normal(face));
+    const uvec3& e = edges.face_edges[face];
+    const bool has_border = !sides.agree_at(e.x) || !sides.agree_at(e.y) || !sides.agree_at(e.z);
+    const double own = has_border ? -1 : glm::dot(normal, slopes[block].direction);
+    cosine[block] = own > -1 ? std::min(cosine[block], own) : -1;  // no direction, no cone
+  }
+  for (size_t i = 0; i < slopes.size(); ++i) {
+    const double half_angle = std::acos(cosine[i]);
+    if (half_angle <= kMostAngle) slopes[i].least_cosine = std::cos(kMostAngle - half_angle);
+  }
+  return slopes;
+}
+
+/// Looks around points. Keeps its scratch memory between calls; one thread at a time.
+class SlopeExplorer {
+ public:
+  SlopeExplorer(const Blocks& blocks, const std::vector<Slope>& slopes, double radius)
+      : blocks_(blocks), slopes_(slopes), radius_(radius), round_of_block_(slopes.size()) {}
+
+  /// Whether all blocks that are connected to this one and touch the ball around the point are gentle.
+  bool is_gentle_around(const dvec3& center, uint32_t block) {
+    ++round_;
+    reached_.clear();
+    reach(center, block);
+    dvec3 sum(0.0);
+    for (size_t i = 0; i < reached_.size(); ++i) {
+      const Slope& slope = slopes_[reached_[i]];
+      if (!(slope.least_cosine <= 1 && glm::dot(slope.direction, slopes_[block].direction) > 0)) return false;
+      sum += slope.normal;
+      for (const uint32_t face : blocks_.outside_of(reached_[i])) reach(center, blocks_.block_of_face[face]);
+    }
+    const dvec3 axis = glm::normalize(sum);
+    return std::ranges::all_of(
+        reached_, [&](uint32_t i) { return glm::dot(slopes_[i].direction, axis) >= slopes_[i].least_cosine; });
+  }
+
+ private:
+  void reach(const dvec3& center, uint32_t block) {
+    const double reach = radius_ + blocks_.radius[block];
+    const dvec3 offset = blocks_.center[block] - center;
+    if (!(glm::dot(offset, offset) <= reach * reach) || std::exchange(round_of_block_[block], round_) == round_) return;
+    reached_.push_back(block);
+  }
+
+  const Blocks& blocks_;
+  const std::vector<Slope>& slopes_;
+  const double radius_;
+  uint32_t round_ = 0;                    ///< counts calls
+  std::vector<uint32_t> round_of_block_;  ///< in which it was last reached
   std::vector<uint32_t> reached_;
 };
 
 }  // namespace
 
-std::vector<uint8_t> find_gentle_faces(const Surface& surface, const EdgeTable& edges, double resolution,
-                                       const Job& job) {
+std::vector<uint8_t> find_gentle_faces(const Surface& surface, const EdgeTable& edges, const Blocks& blocks,
+                                       double resolution, const Job& job) {
   const Patches patches = make_patches(surface, edges, kPatchRadius * resolution);
-  const std::vector<vec3> normals = face_normals(surface);
+  const std::vector<Slope> slopes = block_slopes(surface, edges, blocks);
   std::vector<uint8_t> is_gentle(patches.seeds.size());
-  const size_t grain = std::max<size_t>(256, patches.seeds.size() / 64);  // an explorer has room for each face
+  const size_t grain = std::max<size_t>(256, patches.seeds.size() / 64);  // an explorer has room for each block
   parallel_for(patches.seeds.size(), grain, [&](size_t begin, size_t end) {
-    SlopeExplorer explorer(surface, edges, normals, (1 + kPatchRadius) * resolution);
+    SlopeExplorer explorer(blocks, slopes, (1 + kPatchRadius) * resolution);
     for (size_t i = begin; i < end && !job.is_cancelled(); ++i) {
-      is_gentle[i] = explorer.is_gentle_around(patches.seeds[i]);
+      const uint32_t seed = patches.seeds[i], block = blocks.block_of_face[seed];
+      is_gentle[i] = blocks.radius[block] <= kLargeBlock * resolution &&
+                     explorer.is_gentle_around(evaluation_point(surface, seed), block);
     }
   });
   std::vector<uint8_t> result(surface.triangles.size());

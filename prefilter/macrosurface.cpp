@@ -8,8 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
-#include <span>
 #include <utility>
 
 #include "base/index.h"
@@ -68,59 +66,6 @@ class ComponentCounter {
   std::vector<uint32_t> parent_;
   int components_ = 0;
 };
-
-/// A part of the surface that lies within a ball, and where it goes on.
-struct Blocks {
-  std::vector<uint32_t> block_of_face;  ///< per face
-  std::vector<uint32_t> face_count;     ///< per block
-  std::vector<dvec3> center;            ///< per block: of a ball around all corners of its faces
-  std::vector<double> radius;           ///< per block: of that ball
-  std::vector<uint32_t> first_outside;  ///< per block, and one past the last: where its faces begin in `outside`
-  std::vector<uint32_t> outside;        ///< faces of other blocks that share an edge with one of the block
-
-  std::span<const uint32_t> outside_of(uint32_t block) const {
-    return std::span(outside).subspan(first_outside[block], first_outside[block + 1] - first_outside[block]);
-  }
-};
-
-/// Calls visit(face, neighbour) for each pair of faces of different blocks that share an edge, both ways.
-template <typename Visit>
-void for_each_border(const EdgeTable& edges, const std::vector<uint32_t>& block_of_face, Visit&& visit) {
-  for (uint32_t edge = 0; edge < edges.size(); ++edge) {
-    for (const uint32_t face : edges.faces_of(edge)) {
-      for (const uint32_t neighbour : edges.faces_of(edge)) {
-        if (block_of_face[face] != block_of_face[neighbour]) visit(face, neighbour);
-      }
-    }
-  }
-}
-
-Blocks make_blocks(const Surface& surface, const EdgeTable& edges, double radius) {
-  Patches patches = make_patches(surface, edges, radius);
-  Blocks blocks;
-  blocks.block_of_face = std::move(patches.patch_of_face);
-  for (const uint32_t seed : patches.seeds) blocks.center.push_back(evaluation_point(surface, seed));
-  blocks.face_count.assign(blocks.center.size(), 0);
-  blocks.radius.assign(blocks.center.size(), 0);
-  for (uint32_t face = 0; face < blocks.block_of_face.size(); ++face) {
-    const uint32_t block = blocks.block_of_face[face];
-    ++blocks.face_count[block];
-    for (int c = 0; c < 3; ++c) {
-      const double distance = glm::length(corner_position(surface, face, c) - blocks.center[block]);
-      blocks.radius[block] = std::max(blocks.radius[block], distance);
-    }
-  }
-  blocks.first_outside.assign(blocks.center.size() + 1, 0);
-  for_each_border(edges, blocks.block_of_face,
-                  [&](uint32_t face, uint32_t) { ++blocks.first_outside[blocks.block_of_face[face] + 1]; });
-  std::partial_sum(blocks.first_outside.begin(), blocks.first_outside.end(), blocks.first_outside.begin());
-  blocks.outside.resize(blocks.first_outside.back());
-  std::vector<uint32_t> next = blocks.first_outside;
-  for_each_border(edges, blocks.block_of_face, [&](uint32_t face, uint32_t neighbour) {
-    blocks.outside[next[blocks.block_of_face[face]]++] = neighbour;
-  });
-  return blocks;
-}
 
 /// Evaluates the criterion of 7.1.2. Keeps its scratch memory between calls; one thread at a time.
 class BallExplorer {
@@ -366,8 +311,8 @@ std::vector<uint8_t> classify_macrosurface(const Surface& surface, float resolut
   if (!(resolution > 0)) return std::vector<uint8_t>(surface.triangles.size(), 1);
   const EdgeTable edges = build_edge_table(surface.triangles, surface.positions.size());
   const Patches patches = make_patches(surface, edges, kPatchRadius * resolution);
-  const std::vector<uint8_t> is_gentle = find_gentle_faces(surface, edges, resolution, job);
   const Blocks blocks = make_blocks(surface, edges, kBlockRadius * resolution);
+  const std::vector<uint8_t> is_gentle = find_gentle_faces(surface, edges, blocks, resolution, job);
 
   std::vector<uint8_t> patch_is_macrosurface(patches.seeds.size());
   const size_t grain = std::max<size_t>(256, patches.seeds.size() / 64);  // an explorer has room for each face

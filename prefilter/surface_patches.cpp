@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
+#include <utility>
 
 #include "base/index.h"
 
@@ -13,6 +15,18 @@ namespace {
 /// triangle better than its centre of mass (thesis 7.2.2). The halves of a square have 2: both are judged from the
 /// square's middle, so that quads rarely fall apart. An equilateral triangle has 1.15.
 constexpr double kElongated = 1.5;
+
+/// Calls visit(face, neighbour) for each pair of faces of different blocks that share an edge, both ways.
+template <typename Visit>
+void for_each_border(const EdgeTable& edges, const std::vector<uint32_t>& block_of_face, Visit&& visit) {
+  for (uint32_t edge = 0; edge < edges.size(); ++edge) {
+    for (const uint32_t face : edges.faces_of(edge)) {
+      for (const uint32_t neighbour : edges.faces_of(edge)) {
+        if (block_of_face[face] != block_of_face[neighbour]) visit(face, neighbour);
+      }
+    }
+  }
+}
 
 }  // namespace
 
@@ -62,6 +76,33 @@ Patches make_patches(const Surface& surface, const EdgeTable& edges, double radi
     }
   }
   return patches;
+}
+
+Blocks make_blocks(const Surface& surface, const EdgeTable& edges, double radius) {
+  Patches patches = make_patches(surface, edges, radius);
+  Blocks blocks;
+  blocks.block_of_face = std::move(patches.patch_of_face);
+  for (const uint32_t seed : patches.seeds) blocks.center.push_back(evaluation_point(surface, seed));
+  blocks.face_count.assign(blocks.center.size(), 0);
+  blocks.radius.assign(blocks.center.size(), 0);
+  for (uint32_t face = 0; face < blocks.block_of_face.size(); ++face) {
+    const uint32_t block = blocks.block_of_face[face];
+    ++blocks.face_count[block];
+    for (int c = 0; c < 3; ++c) {
+      const double distance = glm::length(corner_position(surface, face, c) - blocks.center[block]);
+      blocks.radius[block] = std::max(blocks.radius[block], distance);
+    }
+  }
+  blocks.first_outside.assign(blocks.center.size() + 1, 0);
+  for_each_border(edges, blocks.block_of_face,
+                  [&](uint32_t face, uint32_t) { ++blocks.first_outside[blocks.block_of_face[face] + 1]; });
+  std::partial_sum(blocks.first_outside.begin(), blocks.first_outside.end(), blocks.first_outside.begin());
+  blocks.outside.resize(blocks.first_outside.back());
+  std::vector<uint32_t> next = blocks.first_outside;
+  for_each_border(edges, blocks.block_of_face, [&](uint32_t face, uint32_t neighbour) {
+    blocks.outside[next[blocks.block_of_face[face]]++] = neighbour;
+  });
+  return blocks;
 }
 
 }  // namespace farfield
