@@ -12,6 +12,7 @@ namespace farfield {
 struct SceneOptions {
   AssemblyRule assemblies = AssemblyRule::Repeated;  ///< of glTF
   FogOptions fog;                                    ///< of an OpenVDB file alone
+  bool tiles = true;                                 ///< of glTF: cut_into_tiles()
 };
 
 /// Of an OpenVDB file: one instance of its volume where the file has it, and nothing else. Errors: those of

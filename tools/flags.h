@@ -24,4 +24,9 @@ CLI::Option* add_parsed_option(CLI::App* app, const std::string& flag, T& target
   return app->add_option_function<std::string>(flag, read, help);
 }
 
+/// SceneOptions::tiles.
+inline CLI::Option* add_tiles_flag(CLI::App* app, bool& tiles) {
+  return app->add_flag("!--no-tiles", tiles, "Keep grounds whole: do not bake what is wide and flat as tiles");
+}
+
 }  // namespace farfield::tool
