@@ -248,7 +248,7 @@ class Baker {
     LevelReport level_report;
     level_report.grid = 2 * options_.finest_grid;
     const Stopwatch watch;
-    FARFIELD_TRY_LET(look_, write_textures(source_, workspace_.asset_dir(), options_.job));
+    FARFIELD_TRY_LET(look_, write_textures(source_, workspace_.asset_dir(), options_.known_textures, options_.job));
     texel_areas_ = texel_areas(source_, look_);
     report_.manifest.textures = look_.textures;
     report_.manifest.materials = look_.materials;
@@ -354,10 +354,10 @@ class Baker {
 
     options_.job.report(share_done(level, 0.03), fmt::format("level {}: simplify", level));
     const Stopwatch simplification;
-    SimplifyResult simplified = simplify(
-        parts.macrosurface,
-        {static_cast<float>(resolution), options_.simplify, cut_points_.find(parts.macrosurface.positions)},
-        options_.job);
+    SimplifyResult simplified =
+        simplify(parts.macrosurface,
+                 {static_cast<float>(resolution), options_.simplify, cut_points_.find(parts.macrosurface.positions)},
+                 options_.job);
     if (options_.job.is_cancelled()) return cancelled();
     FARFIELD_TRY(keep_walls_apart(level, resolution, parts.macrosurface, simplified, level_report));
     SurfaceOrder order = order_surface(simplified.surface);
@@ -379,7 +379,7 @@ class Baker {
   Result<void> keep_walls_apart(uint32_t level, double resolution, const Surface& macrosurface,
                                 SimplifyResult& simplified, LevelReport& level_report) {
     FARFIELD_TRY_LET(level_report.apart, keep_apart(macrosurface, static_cast<float>(resolution), simplified,
-                                                           cut_points_.find(simplified.surface.positions)));
+                                                    cut_points_.find(simplified.surface.positions)));
     const ApartReport& apart = level_report.apart;
     if (apart.crossing > 0) {
       report_.warnings.push_back(fmt::format(
@@ -521,8 +521,10 @@ class Baker {
     return most_bytes_after(before, level == last_level_);
   }
 
+  /// Tiles have their textures together.
   uint64_t texture_bytes(uint32_t level) const {
-    return texture_bytes_at(texel_areas_, look_, std::ldexp(report_.manifest.base_resolution, static_cast<int>(level)));
+    const double resolution = std::ldexp(report_.manifest.base_resolution, static_cast<int>(level));
+    return texture_bytes_at(texel_areas_, look_, resolution) / options_.import.tile.count;
   }
 
   static tl::unexpected<Error> cancelled() { return make_error(ErrorCode::Cancelled, "bake: cancelled"); }

@@ -54,6 +54,7 @@ std::vector<std::string> shot_command(const std::string& program, const RenderOp
   add("--finest-grid", options.finest_grid);
   add("--rays-per-voxel", options.rays_per_voxel);
   add("--assemblies", name_of(options.assemblies));
+  add("--tile-triangles", options.tile_triangles);
   add("--exposure", options.exposure_stops);
   add("--threads", thread_count());
   add("--parent", ::getpid());
@@ -61,7 +62,6 @@ std::vector<std::string> shot_command(const std::string& program, const RenderOp
   if (!options.environment.empty()) add("--environment", options.environment.string());
   if (!options.camera.empty()) add("--camera", options.camera);
   if (options.frames_per_second > 0) add("--fps", options.frames_per_second);
-  if (!options.tiles) command.push_back("--no-tiles");
   if (!options.sky) command.push_back("--no-sky");
   if (options.turn_sun) command.push_back("--turn-sun");
   if (options.full_detail) command.push_back("--full-detail");

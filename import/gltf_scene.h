@@ -40,8 +40,8 @@ struct GltfMesh {
   FogOptions fog;                           ///< of that file
   std::string model;                        ///< OBJ or PLY file, relative to the scene's folder; empty: none
   std::optional<SubdivisionScheme> scheme;  ///< of that file; none: as the caller asks
-  MeshTile tile;       ///< which part of mesh number `whole` it is
-  uint32_t whole = 0;  ///< of a tile: index into GltfScene::meshes
+  MeshTile tile;                            ///< which part of mesh number `whole` it is
+  uint32_t whole = 0;                       ///< of a tile: index into GltfScene::meshes
 
   bool is_empty() const { return triangle_count == 0 && volume.empty(); }
 };

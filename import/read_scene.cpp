@@ -10,7 +10,7 @@ namespace farfield {
 Result<GltfScene> read_scene(const std::filesystem::path& path, const SceneOptions& options) {
   if (!is_volume_file(path)) {
     FARFIELD_TRY_LET(auto scene, read_gltf_scene(path, options.assemblies));
-    if (options.tiles) cut_into_tiles(scene);
+    if (options.tile_triangles > 0) cut_into_tiles(scene, options.tile_triangles);
     return scene;
   }
   FARFIELD_TRY_LET(const auto extent, read_volume_extent(path, options.fog));

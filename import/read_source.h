@@ -43,8 +43,8 @@ class FileHashes {
 struct ImportOptions {
   int mesh =
       -1;  ///< glTF only: import this mesh alone, in its own space; -1: all nodes of the default scene, flattened
-  int node = -1;  ///< glTF only: import all that this node of the file and those below show, in the node's own space
-  MeshTile tile{};                     ///< import_asset() gives only this part of the mesh
+  int node = -1;    ///< glTF only: import all that this node of the file and those below show, in the node's own space
+  MeshTile tile{};  ///< import_asset() gives only this part of the mesh
   SubdivisionOptions subdivision{};    ///< of meshes; read_source() gives the cage, import_asset() what becomes of it
   FogOptions fog{};                    ///< OpenVDB files only: what read_volume() is given
   FileHashes* known_hashes = nullptr;  ///< hashes are looked for there first; null: they read

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstdlib>
 #include <vector>
 
 #include "base/text.h"
@@ -36,15 +35,15 @@ bool is_flat(const Box3& bounds) {
   return sides[0] <= kFlat * sides[1];
 }
 
-/// As many as make tiles of up to kTileTriangles, a power of two, so that all have as many.
-uint32_t tile_count(const GltfMesh& mesh) {
-  uint64_t n = kTileTriangles; if (const char* e = getenv("TILE_N")) n = std::strtoull(e, nullptr, 10);
-  const uint64_t tiles = (mesh.triangle_count + n - 1) / n;
-  return static_cast<uint32_t>(std::min(std::bit_ceil(tiles), kMostTiles));
+/// As many as make tiles of up to so many triangles: a power of two, so that all have as many.
+uint32_t tile_count(const GltfMesh& mesh, uint64_t tile_triangles) {
+  const uint64_t tiles = mesh.triangle_count / tile_triangles + (mesh.triangle_count % tile_triangles > 0);
+  if (tiles <= 2) return 1;
+  return static_cast<uint32_t>(std::bit_ceil(std::min(tiles, kMostTiles)));
 }
 
 /// Per mesh: how many tiles it is cut into; 1: none.
-std::vector<uint32_t> tile_counts(const GltfScene& scene) {
+std::vector<uint32_t> tile_counts(const GltfScene& scene, uint64_t tile_triangles) {
   std::vector<uint64_t> shown(scene.meshes.size(), 0);
   std::vector<float> widest(scene.meshes.size(), 0.0f), sides;
   for (const GltfInstance& instance : scene.instances) {
@@ -60,7 +59,7 @@ std::vector<uint32_t> tile_counts(const GltfScene& scene) {
     const GltfMesh& mesh = scene.meshes[m];
     const bool is_ground = mesh.volume.empty() && shown[m] > 0 && shown[m] <= kMostInstances &&
                            widest[m] >= kWide * *median && !mesh.bounds.is_empty() && is_flat(mesh.bounds);
-    if (is_ground) counts[m] = tile_count(mesh);
+    if (is_ground) counts[m] = tile_count(mesh, tile_triangles);
   }
   return counts;
 }
@@ -69,9 +68,8 @@ std::vector<uint32_t> tile_counts(const GltfScene& scene) {
 std::string tile_name(const GltfScene& scene, const GltfMesh& whole, const MeshTile& tile) {
   std::string name = fmt::format("{}_tile_{}", whole.asset_name, tile.number);
   const auto is_taken = [&] {
-    return std::ranges::any_of(scene.meshes, [&](const GltfMesh& mesh) {
-      return lower_case(mesh.asset_name) == lower_case(name);
-    });
+    return std::ranges::any_of(scene.meshes,
+                               [&](const GltfMesh& mesh) { return lower_case(mesh.asset_name) == lower_case(name); });
   };
   while (is_taken()) name += "_";
   return name;
@@ -90,16 +88,17 @@ void add_tiles(GltfScene& scene, uint32_t mesh, uint32_t count) {
 
 }  // namespace
 
-void cut_into_tiles(GltfScene& scene) {
-  const std::vector<uint32_t> counts = tile_counts(scene);
+void cut_into_tiles(GltfScene& scene, uint64_t tile_triangles) {
+  const std::vector<uint32_t> counts = tile_counts(scene, tile_triangles);
   if (std::ranges::all_of(counts, [](uint32_t count) { return count == 1; })) return;
   std::vector<uint32_t> first_tile(counts.size(), 0);
   for (uint32_t m = 0; m < counts.size(); ++m) {
     if (counts[m] == 1) continue;
     first_tile[m] = static_cast<uint32_t>(scene.meshes.size());
     add_tiles(scene, m, counts[m]);
-    scene.warnings.push_back(fmt::format("mesh {}: wide, flat and of {} triangles: baked as {} tiles; --no-tiles keeps it whole", scene.meshes[m].asset_name,
-                                         scene.meshes[m].triangle_count, counts[m]));
+    scene.warnings.push_back(
+        fmt::format("mesh {}: wide, flat and of {} triangles: baked as {} tiles; --tile-triangles 0 keeps it whole",
+                    scene.meshes[m].asset_name, scene.meshes[m].triangle_count, counts[m]));
   }
   std::vector<GltfInstance> instances;
   std::vector<mat4x3> in_node;

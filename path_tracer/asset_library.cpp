@@ -41,7 +41,7 @@ SceneBakeOptions scene_bake_options(const RenderOptions& options) {
   bake.finest_grid = options.finest_grid;
   bake.rays_per_voxel = options.rays_per_voxel;
   bake.source_only = options.full_detail;
-  bake.read = {options.assemblies, options.fog, options.tiles};
+  bake.read = {options.assemblies, options.fog, options.tile_triangles};
   bake.downsampling = options.downsampling;
   bake.subdivision = options.subdivision;
   return bake;
@@ -89,6 +89,8 @@ std::vector<std::string> bake_command(const RenderOptions& options, const SceneB
                                       fmt::format("{}", bake.rays_per_voxel),
                                       "--assemblies",
                                       name_of(bake.read.assemblies),
+                                      "--tile-triangles",
+                                      fmt::format("{}", bake.read.tile_triangles),
                                       "--downsampling",
                                       name_of(bake.downsampling),
                                       "--threads",
@@ -97,7 +99,6 @@ std::vector<std::string> bake_command(const RenderOptions& options, const SceneB
                                       fmt::format("{}", ::getpid()),
                                       "--no-warnings"};  // said here, from the manifests
   if (bake.source_only) command.push_back("--source-only");
-  if (!bake.read.tiles) command.push_back("--no-tiles");
   add_fog_flags(bake.read.fog, command);
   add_subdivision_flags(bake.subdivision, command);
   return command;

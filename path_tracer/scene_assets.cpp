@@ -88,18 +88,25 @@ Result<size_t> bake_scene_assets(const SceneBakeOptions& options) {
   size_t failed = 0;
   FileHashes hashes;  // the scene is read once for them, however many assets it has
   KnownMesh whole;    // and a mesh once for its tiles, which follow each other
+  TextureFiles textures_of_tiles;
   const std::vector<size_t> numbers = numbers_to_bake(options, scene);
   free_memory(scene.instances);  // a million take as much as a bake
   for (size_t i = 0; i < numbers.size(); ++i) {
     const GltfMesh& mesh = scene.meshes[numbers[i]];
     BakeOptions how = asset_bake_options(options, scene, numbers[i], hashes);
     how.import.known_mesh = &whole;
-    if (!mesh.tile.is_part()) whole.forget();
+    if (mesh.tile.is_part())
+      how.known_textures = textures_of_tiles;
+    else
+      whole.forget();
     how.job = job_of_asset(options.job, mesh.asset_name, i, numbers.size());
     if (options.begin) options.begin(mesh.asset_name);
     const auto report = bake(asset_source(options, mesh), asset_folder(options, mesh), how);
     if (!report && report.error().code == ErrorCode::Cancelled) return tl::unexpected(report.error());
     if (!report) ++failed;
+    if (report && mesh.tile.is_part())
+      for (const AssetTexture& texture : report->manifest.textures)
+        textures_of_tiles.try_emplace(texture.file_hash, asset_folder(options, mesh) / texture.file);
     if (options.end) options.end(mesh.asset_name, report);
     malloc_trim(0);  // the next one starts as small as in a process of its own
   }

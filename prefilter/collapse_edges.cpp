@@ -330,7 +330,8 @@ class Simplifier {
     const auto accept = [&](const Placement& placement) -> std::optional<Placement> {
       return is_valid(a, b, placement) ? std::optional(placement) : std::nullopt;
     };
-    if (is_pinned(a) || is_pinned(b)) return may_merge_into_pinned(a, b) ? accept(keep_vertex(ring_, is_pinned(a) ? pa : pb)) : std::nullopt;
+    if (is_pinned(a) || is_pinned(b))
+      return may_merge_into_pinned(a, b) ? accept(keep_vertex(ring_, is_pinned(a) ? pa : pb)) : std::nullopt;
     const auto optimum = [&] { return closest_position(ring_, 0.5 * (pa + pb), tolerance); };
     if (kind_a_ == VertexKind::Interior && kind_b_ == VertexKind::Interior) {
       const dvec3 x = optimum();

@@ -281,7 +281,8 @@ Result<ImportedAsset> condition_mesh(SourceMesh& mesh, const std::string& name, 
 
 Result<ImportedAsset> import_tile(const fs::path& path, const ImportOptions& options, const Job& job) {
   KnownMesh own;
-  FARFIELD_TRY_LET(const ImportedAsset* whole, (options.known_mesh ? *options.known_mesh : own).import(path, options, job));
+  FARFIELD_TRY_LET(const ImportedAsset* whole,
+                   (options.known_mesh ? *options.known_mesh : own).import(path, options, job));
   ImportedAsset tile;
   tile.source = cut_tile(whole->source, options.tile);
   if (tile.source.triangles.empty()) {

@@ -32,8 +32,8 @@ struct ImportedAsset {
 /// cannot work in), Cancelled; with the mesh's warnings.
 Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name, const Job& job = {});
 
-/// The mesh that tiles were last cut from, so that its many tiles read it once. Files are taken not to change meanwhile.
-/// One thread at a time.
+/// The mesh that tiles were last cut from, so that its many tiles read it once. Files are taken not to change
+/// meanwhile. One thread at a time.
 class KnownMesh {
  public:
   /// The whole mesh, whatever tile the options want. Valid until the next call. Errors: those of import_asset().

@@ -79,9 +79,7 @@ void drop_unused_textures(SourceSurface& surface) {
   }
 }
 
-bool is_less(const vec3& a, const vec3& b) {
-  return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
-}
+bool is_less(const vec3& a, const vec3& b) { return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z; }
 
 /// Lets what is `on_cut` spread along borders over vertices that the source has not: they split edges of the cut.
 void spread_to_new_vertices(const Surface& surface, const std::vector<uint8_t>& is_new, std::vector<uint8_t>& on_cut) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <string>
 
 #include "base/result.h"
@@ -24,9 +25,13 @@ CLI::Option* add_parsed_option(CLI::App* app, const std::string& flag, T& target
   return app->add_option_function<std::string>(flag, read, help);
 }
 
-/// SceneOptions::tiles.
-inline CLI::Option* add_tiles_flag(CLI::App* app, bool& tiles) {
-  return app->add_flag("!--no-tiles", tiles, "Keep grounds whole: do not bake what is wide and flat as tiles");
+/// SceneOptions::tile_triangles.
+inline CLI::Option* add_tiles_flag(CLI::App* app, uint64_t& tile_triangles) {
+  return app
+      ->add_option("--tile-triangles", tile_triangles,
+                   "Grounds (wide, flat and heavy) are baked as tiles of up to so many triangles; 0: whole")
+      ->check(CLI::Range(uint64_t{0}, uint64_t{1} << 32))
+      ->capture_default_str();
 }
 
 }  // namespace farfield::tool

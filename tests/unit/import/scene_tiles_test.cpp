@@ -8,8 +8,10 @@
 namespace farfield {
 namespace {
 
+constexpr uint64_t kTile = 1000;
+
 /// A ground of so many triangles, 100 x 2 x 80, that trees of size 2 stand on.
-GltfScene ground_and_trees(uint64_t triangles = 16 * kTileTriangles) {
+GltfScene ground_and_trees(uint64_t triangles = 16 * kTile) {
   GltfScene scene;
   GltfMesh ground, tree;
   ground.name = ground.asset_name = "ground";
@@ -34,7 +36,7 @@ GltfScene ground_and_trees(uint64_t triangles = 16 * kTileTriangles) {
 TEST(SceneTiles, AGroundBecomesTilesInItsPlace) {
   GltfScene scene = ground_and_trees();
   scene.in_node = {mat4x3(1), mat4x3(2), mat4x3(3)};
-  cut_into_tiles(scene);
+  cut_into_tiles(scene, kTile);
   ASSERT_EQ(scene.meshes.size(), 2u + 16);
   ASSERT_EQ(scene.instances.size(), 2u + 16);
   ASSERT_EQ(scene.in_node.size(), scene.instances.size());
@@ -56,25 +58,25 @@ TEST(SceneTiles, AGroundBecomesTilesInItsPlace) {
   EXPECT_EQ(names.size(), 16u);
   ASSERT_EQ(scene.warnings.size(), 1u);
   EXPECT_NE(scene.warnings[0].find("16 tiles"), std::string::npos) << scene.warnings[0];
-  EXPECT_NE(scene.warnings[0].find("--no-tiles"), std::string::npos);
+  EXPECT_NE(scene.warnings[0].find("--tile-triangles 0"), std::string::npos);
 }
 
 TEST(SceneTiles, NamesAreThoseOfNoOtherAsset) {
   GltfScene scene = ground_and_trees();
   scene.meshes[0].asset_name = "GROUND_tile_3";
-  cut_into_tiles(scene);
+  cut_into_tiles(scene, kTile);
   EXPECT_EQ(scene.meshes[2 + 3].asset_name, "ground_tile_3_");
   EXPECT_EQ(scene.meshes[2 + 4].asset_name, "ground_tile_4");
 }
 
 TEST(SceneTiles, WhatIsNoGroundStaysWhole) {
   const auto is_cut = [](GltfScene scene) {
-    cut_into_tiles(scene);
+    cut_into_tiles(scene, kTile);
     return scene.meshes.size() > 2;
   };
   EXPECT_TRUE(is_cut(ground_and_trees()));
-  EXPECT_FALSE(is_cut(ground_and_trees(kTileTriangles))) << "one tile";
-  EXPECT_TRUE(is_cut(ground_and_trees(kTileTriangles + 1)));
+  EXPECT_FALSE(is_cut(ground_and_trees(2 * kTile))) << "not heavy";
+  EXPECT_TRUE(is_cut(ground_and_trees(2 * kTile + 1)));
   GltfScene scene = ground_and_trees();
   scene.meshes[1].bounds.upper.y = 30;
   EXPECT_FALSE(is_cut(scene)) << "not flat";
@@ -100,7 +102,7 @@ TEST(SceneTiles, WhatIsNoGroundStaysWhole) {
 
 TEST(SceneTiles, AGroundOfWhateverSizeHasABoundedNumberOfTiles) {
   GltfScene scene = ground_and_trees(uint64_t{1} << 62);
-  cut_into_tiles(scene);
+  cut_into_tiles(scene, kTile);
   EXPECT_EQ(scene.meshes.size(), 2u + 4096);
 }
 

@@ -24,9 +24,8 @@ using Segment = std::pair<Point, Point>;
 Point point(const vec3& p) { return {p.x, p.y, p.z}; }
 
 Surface hills(int columns, int rows) {
-  return test::make_grid(columns, rows, false, [](float u, float v) {
-    return vec3(u, v, 0.02f * std::sin(17 * u) * std::cos(11 * v));
-  });
+  return test::make_grid(columns, rows, false,
+                         [](float u, float v) { return vec3(u, v, 0.02f * std::sin(17 * u) * std::cos(11 * v)); });
 }
 
 /// Edges of one face, by their ends.
@@ -35,7 +34,8 @@ std::set<Segment> border_of(const std::vector<vec3>& positions, const std::vecto
   std::set<Segment> border;
   for (uint32_t e = 0; e < edges.size(); ++e) {
     if (edges.faces_of(e).size() != 1) continue;
-    const auto [a, b] = std::minmax(point(positions[edges.smaller_vertex[e]]), point(positions[edges.larger_vertex[e]]));
+    const auto [a, b] =
+        std::minmax(point(positions[edges.smaller_vertex[e]]), point(positions[edges.larger_vertex[e]]));
     border.emplace(a, b);
   }
   return border;
@@ -123,7 +123,8 @@ TEST(CutTile, HasNoTexturesOfOtherTiles) {
   for (SourceMaterial& material : whole.materials)
     material.base_color_map.image = std::make_shared<Texture>(1, 1, std::vector<vec4>{vec4(1)});
   for (size_t t = 0; t < whole.triangles.size(); ++t)
-    whole.material[t] = whole.positions[whole.triangles[t].x].x >= 0.5f || whole.positions[whole.triangles[t].y].x > 0.5f;
+    whole.material[t] =
+        whole.positions[whole.triangles[t].x].x >= 0.5f || whole.positions[whole.triangles[t].y].x > 0.5f;
   const SourceSurface first = cut_tile(whole, {0, 2}), second = cut_tile(whole, {1, 2});
   const SourceSurface& left = first.material[0] == 0 ? first : second;
   ASSERT_EQ(left.materials.size(), 2u) << "materials keep their numbers";
@@ -139,8 +140,7 @@ Levels levels_of(const SourceSurface& tile, float resolution) {
   const ResolvedSurface resolved = resolve(tile, resolution).value();
   const CutPoints cut(tile, resolved);
   const auto simplified = [&](const Surface& surface, float r) {
-    SimplifyResult result =
-        simplify(surface, {.resolution = r, .is_pinned = cut.find(surface.positions)});
+    SimplifyResult result = simplify(surface, {.resolution = r, .is_pinned = cut.find(surface.positions)});
     EXPECT_TRUE(keep_apart(surface, r, result, cut.find(result.surface.positions)));
     return result.surface;
   };
