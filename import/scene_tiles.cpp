@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "base/text.h"
@@ -65,22 +67,17 @@ std::vector<uint32_t> tile_counts(const GltfScene& scene, uint64_t tile_triangle
 }
 
 /// A name that no other asset has, also where upper and lower case are the same.
-std::string tile_name(const GltfScene& scene, const GltfMesh& whole, const MeshTile& tile) {
-  std::string name = fmt::format("{}_tile_{}", whole.asset_name, tile.number);
-  const auto is_taken = [&] {
-    return std::ranges::any_of(scene.meshes,
-                               [&](const GltfMesh& mesh) { return lower_case(mesh.asset_name) == lower_case(name); });
-  };
-  while (is_taken()) name += "_";
+std::string unique_name(std::string name, std::set<std::string>& taken) {
+  while (!taken.insert(lower_case(name)).second) name += "_";
   return name;
 }
 
-void add_tiles(GltfScene& scene, uint32_t mesh, uint32_t count) {
+void add_tiles(GltfScene& scene, uint32_t mesh, uint32_t count, std::set<std::string>& taken) {
   for (uint32_t number = 0; number < count; ++number) {
     GltfMesh tile = scene.meshes[mesh];
     tile.tile = {number, count};
     tile.whole = mesh;
-    tile.asset_name = tile_name(scene, scene.meshes[mesh], tile.tile);
+    tile.asset_name = unique_name(fmt::format("{}_tile_{}", tile.asset_name, number), taken);
     tile.triangle_count = std::max<uint64_t>(1, tile.triangle_count / count);
     scene.meshes.push_back(std::move(tile));
   }
@@ -91,11 +88,13 @@ void add_tiles(GltfScene& scene, uint32_t mesh, uint32_t count) {
 void cut_into_tiles(GltfScene& scene, uint64_t tile_triangles) {
   const std::vector<uint32_t> counts = tile_counts(scene, tile_triangles);
   if (std::ranges::all_of(counts, [](uint32_t count) { return count == 1; })) return;
+  std::set<std::string> taken;
+  for (const GltfMesh& mesh : scene.meshes) taken.insert(lower_case(mesh.asset_name));
   std::vector<uint32_t> first_tile(counts.size(), 0);
   for (uint32_t m = 0; m < counts.size(); ++m) {
     if (counts[m] == 1) continue;
     first_tile[m] = static_cast<uint32_t>(scene.meshes.size());
-    add_tiles(scene, m, counts[m]);
+    add_tiles(scene, m, counts[m], taken);
     scene.warnings.push_back(
         fmt::format("mesh {}: wide, flat and of {} triangles: baked as {} tiles; --tile-triangles 0 keeps it whole",
                     scene.meshes[m].asset_name, scene.meshes[m].triangle_count, counts[m]));

@@ -19,7 +19,8 @@ namespace farfield {
 SourceSurface cut_tile(const SourceSurface& whole, const MeshTile& tile);
 
 /// Where vertices stay in all levels, so that neighbouring tiles meet whatever their levels are: those of the source on
-/// cuts, and those that resolve() puts between them. They are known by their positions, which do not change.
+/// cuts, and those that resolve() puts between them (and, for simplicity, on what continues a border from there). They
+/// are known by their positions, which do not change.
 class CutPoints {
  public:
   CutPoints() = default;

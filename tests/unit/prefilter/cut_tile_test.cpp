@@ -34,9 +34,8 @@ std::set<Segment> border_of(const std::vector<vec3>& positions, const std::vecto
   std::set<Segment> border;
   for (uint32_t e = 0; e < edges.size(); ++e) {
     if (edges.faces_of(e).size() != 1) continue;
-    const auto [a, b] =
-        std::minmax(point(positions[edges.smaller_vertex[e]]), point(positions[edges.larger_vertex[e]]));
-    border.emplace(a, b);
+    const Point a = point(positions[edges.smaller_vertex[e]]), b = point(positions[edges.larger_vertex[e]]);
+    border.emplace(std::min(a, b), std::max(a, b));
   }
   return border;
 }
@@ -183,7 +182,8 @@ TEST(CutTile, NeighboursMeetWhereDetailSplitsTheCut) {
     size_t split = 0;
     for (size_t v = 0; v < is_cut.size(); ++v) {
       const vec3& p = resolved.surface.positions[v];
-      EXPECT_EQ(is_cut[v] != 0, p.x == 0.5f) << p.x << ' ' << p.y;
+      const bool continues_it = (p.y == 0 || p.y == 1) && std::abs(p.x - 0.5f) < 0.25f;  // on the edge at its end
+      if (!continues_it) EXPECT_EQ(is_cut[v] != 0, p.x == 0.5f) << p.x << ' ' << p.y;
       split += is_cut[v] && std::abs(4 * p.y - std::round(4 * p.y)) > 1e-3f;
     }
     EXPECT_GT(split, 4u);
