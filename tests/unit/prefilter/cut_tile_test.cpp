@@ -183,7 +183,9 @@ TEST(CutTile, NeighboursMeetWhereDetailSplitsTheCut) {
     for (size_t v = 0; v < is_cut.size(); ++v) {
       const vec3& p = resolved.surface.positions[v];
       const bool continues_it = (p.y == 0 || p.y == 1) && std::abs(p.x - 0.5f) < 0.25f;  // on the edge at its end
-      if (!continues_it) EXPECT_EQ(is_cut[v] != 0, p.x == 0.5f) << p.x << ' ' << p.y;
+      if (!continues_it) {
+        EXPECT_EQ(is_cut[v] != 0, p.x == 0.5f) << p.x << ' ' << p.y;
+      }
       split += is_cut[v] && std::abs(4 * p.y - std::round(4 * p.y)) > 1e-3f;
     }
     EXPECT_GT(split, 4u);
