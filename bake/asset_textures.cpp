@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <span>
+#include <system_error>
 #include <tuple>
 
 #include "base/file_io.h"
@@ -76,11 +77,23 @@ Texture make_mask(const SourceMaterial& material) {
   return Texture(width, height, texels);
 }
 
+/// Makes `file` a link to `known`, if that still has these bytes. A copy does as well, so nothing is said if it cannot.
+void link_to(const fs::path& known, const fs::path& file, uint64_t hash) {
+  fs::path link = file;
+  link += ".link";
+  std::error_code error;
+  fs::create_hard_link(known, link, error);
+  if (error) return;
+  const auto now = hash_file(link);
+  if (now && *now == hash) fs::rename(link, file, error);
+  fs::remove(link, error);
+}
+
 /// Writes textures, each once.
 class TextureWriter {
  public:
-  TextureWriter(const TextureModule& module, fs::path folder, AssetLook& look)
-      : module_(module), folder_(std::move(folder)), look_(look) {}
+  TextureWriter(const TextureModule& module, fs::path folder, const TextureFiles& known, AssetLook& look)
+      : module_(module), folder_(std::move(folder)), known_(known), look_(look) {}
 
   Result<TextureRef> write_map(const SourceTexture& map, MapUse use) {
     if (!map) return TextureRef{};
@@ -119,12 +132,15 @@ class TextureWriter {
     FARFIELD_TRY(sync_file(path));
     FARFIELD_TRY_LET(texture.file_hash, hash_file(path));
     texture.file_bytes = fs::file_size(path);
+    if (const auto known = known_.find(texture.file_hash); known != known_.end())
+      link_to(known->second, path, texture.file_hash);
     look_.textures.push_back(std::move(texture));
     return {};
   }
 
   const TextureModule& module_;
   const fs::path folder_;
+  const TextureFiles& known_;
   AssetLook& look_;
   std::map<std::pair<const Texture*, MapUse>, Index> written_;
   std::map<std::tuple<const Texture*, const Texture*, float, float>, Index> masks_;
@@ -146,7 +162,8 @@ Result<void> write_maps(const SourceMaterial& from, TextureWriter& writer, Asset
 
 }  // namespace
 
-Result<AssetLook> write_textures(const SourceSurface& source, const fs::path& folder, const Job& job) {
+Result<AssetLook> write_textures(const SourceSurface& source, const fs::path& folder, const TextureFiles& known,
+                                 const Job& job) {
   AssetLook look;
   for (const SourceMaterial& material : source.materials) {
     static_cast<MaterialFactors&>(look.materials.emplace_back()) = material;
@@ -155,7 +172,7 @@ Result<AssetLook> write_textures(const SourceSurface& source, const fs::path& fo
       !source.material_function && !source.corner_uv.empty() && std::ranges::any_of(source.materials, has_textures);
   if (!has_maps) return look;
   FARFIELD_TRY_LET(const TextureModule* module, texture_module());
-  TextureWriter writer(*module, folder, look);
+  TextureWriter writer(*module, folder, known, look);
   for (size_t m = 0; m < look.materials.size(); ++m) {
     if (job.is_cancelled()) return make_error(ErrorCode::Cancelled, "bake: cancelled");
     FARFIELD_TRY(write_maps(source.materials[m], writer, look.materials[m]));

@@ -2,7 +2,9 @@
 // What level 0 keeps of the source's materials: textures that can be paged in, written into the asset.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <map>
 #include <vector>
 
 #include "base/job.h"
@@ -17,9 +19,14 @@ struct AssetLook {
   std::vector<AssetTexture> textures;
 };
 
+/// Files of textures by the hash of their bytes.
+using TextureFiles = std::map<uint64_t, std::filesystem::path>;
+
 /// Writes each image that the source's materials use into `folder`, once per way of use, as texture_N.tif. Same source,
-/// same bytes. Errors: Io, Cancelled.
-Result<AssetLook> write_textures(const SourceSurface& source, const std::filesystem::path& folder, const Job& job);
+/// same bytes. What is equal to a `known` file becomes a hard link to it where the file system has such. Errors: Io,
+/// Cancelled.
+Result<AssetLook> write_textures(const SourceSurface& source, const std::filesystem::path& folder,
+                                 const TextureFiles& known, const Job& job);
 
 /// Per texture: how much of the surface one of its texels covers at most, in scene units squared; 0 where nothing says.
 std::vector<double> texel_areas(const SourceSurface& source, const AssetLook& look);

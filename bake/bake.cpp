@@ -31,6 +31,7 @@
 #include "base/result.h"
 #include "cache/level_file.h"
 #include "import/read_volume.h"
+#include "prefilter/cut_tile.h"
 #include "prefilter/face_materials.h"
 #include "prefilter/keep_apart.h"
 #include "prefilter/macrosurface.h"
@@ -69,7 +70,10 @@ std::string canonical_options(const BakeOptions& options, bool is_volume) {
                        import);
   }
   const std::string node = options.import.node < 0 ? "" : fmt::format("node={} ", options.import.node);
-  const std::string import = fmt::format("mesh={} {}{}condition={}", options.import.mesh, node,
+  const MeshTile& part = options.import.tile;
+  const std::string tile =
+      part.is_part() ? fmt::format("tile={}/{} tiles={} ", part.number, part.count, kTilesVersion) : "";
+  const std::string import = fmt::format("mesh={} {}{}{}condition={}", options.import.mesh, node, tile,
                                          canonical_text(import_options(options).subdivision), kConditionVersion);
   if (options.source_only) return "source_only=1 " + import;
   constexpr int kMorphVersion = 1;  // of what the manifest has of morphs
@@ -244,7 +248,7 @@ class Baker {
     LevelReport level_report;
     level_report.grid = 2 * options_.finest_grid;
     const Stopwatch watch;
-    FARFIELD_TRY_LET(look_, write_textures(source_, workspace_.asset_dir(), options_.job));
+    FARFIELD_TRY_LET(look_, write_textures(source_, workspace_.asset_dir(), options_.known_textures, options_.job));
     texel_areas_ = texel_areas(source_, look_);
     report_.manifest.textures = look_.textures;
     report_.manifest.materials = look_.materials;
@@ -317,6 +321,7 @@ class Baker {
       return make_error(resolved.error().code,
                         fmt::format("{}: {}", report_.manifest.source, resolved.error().message));
     }
+    cut_points_ = CutPoints(source_, *resolved);
     surface_ = std::move(resolved->surface);
     // From the final numbers of level 0; what is not there any more fades out.
     static_assert(kNoIndex == kMorphVoxelized);
@@ -350,7 +355,9 @@ class Baker {
     options_.job.report(share_done(level, 0.03), fmt::format("level {}: simplify", level));
     const Stopwatch simplification;
     SimplifyResult simplified =
-        simplify(parts.macrosurface, {static_cast<float>(resolution), options_.simplify}, options_.job);
+        simplify(parts.macrosurface,
+                 {static_cast<float>(resolution), options_.simplify, cut_points_.find(parts.macrosurface.positions)},
+                 options_.job);
     if (options_.job.is_cancelled()) return cancelled();
     FARFIELD_TRY(keep_walls_apart(level, resolution, parts.macrosurface, simplified, level_report));
     SurfaceOrder order = order_surface(simplified.surface);
@@ -371,7 +378,8 @@ class Baker {
 
   Result<void> keep_walls_apart(uint32_t level, double resolution, const Surface& macrosurface,
                                 SimplifyResult& simplified, LevelReport& level_report) {
-    FARFIELD_TRY_LET(level_report.apart, keep_apart(macrosurface, static_cast<float>(resolution), simplified));
+    FARFIELD_TRY_LET(level_report.apart, keep_apart(macrosurface, static_cast<float>(resolution), simplified,
+                                                    cut_points_.find(simplified.surface.positions)));
     const ApartReport& apart = level_report.apart;
     if (apart.crossing > 0) {
       report_.warnings.push_back(fmt::format(
@@ -513,8 +521,10 @@ class Baker {
     return most_bytes_after(before, level == last_level_);
   }
 
+  /// Tiles have their textures together.
   uint64_t texture_bytes(uint32_t level) const {
-    return texture_bytes_at(texel_areas_, look_, std::ldexp(report_.manifest.base_resolution, static_cast<int>(level)));
+    const double resolution = std::ldexp(report_.manifest.base_resolution, static_cast<int>(level));
+    return texture_bytes_at(texel_areas_, look_, resolution) / options_.import.tile.count;
   }
 
   static tl::unexpected<Error> cancelled() { return make_error(ErrorCode::Cancelled, "bake: cancelled"); }
@@ -544,6 +554,7 @@ class Baker {
   Surface sub_resolution_;         ///< all that has left the surface so far, but for wall_ and sheet_
   Surface wall_;                   ///< pieces of the walls that are wrapped at the level at hand
   Surface sheet_;                  ///< pieces of the half-open ones that are laid as sheets
+  CutPoints cut_points_;           ///< if the source is a tile
   std::vector<uint8_t> is_shell_;  ///< faces of surface_ that are such walls
   MorphMaps from_stored_;          ///< from the last written level to surface_
   dvec3 middle_{0.0};              ///< of the source's bounds

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "bake/asset_textures.h"
 #include "base/job.h"
 #include "base/result.h"
 #include "cache/level.h"
@@ -41,6 +42,7 @@ struct BakeOptions {
   bool source_only = false;                           ///< write only level 0 (what --full-detail renders)
   bool even_if_up_to_date = false;  ///< of an asset in memory: its hash does not say all that it depends on
   ImportOptions import;
+  TextureFiles known_textures;  ///< of other assets on the same disk, to which equal ones are linked
 
   /// Called by the baking thread for each level of a mesh that is made, from 1 on; its error ends the bake.
   std::function<Result<void>(const LevelSurfaces&)> see_surfaces;

@@ -54,6 +54,7 @@ std::vector<std::string> shot_command(const std::string& program, const RenderOp
   add("--finest-grid", options.finest_grid);
   add("--rays-per-voxel", options.rays_per_voxel);
   add("--assemblies", name_of(options.assemblies));
+  add("--tile-triangles", options.tile_triangles);
   add("--exposure", options.exposure_stops);
   add("--threads", thread_count());
   add("--parent", ::getpid());

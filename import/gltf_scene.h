@@ -13,6 +13,7 @@
 #include "base/vec.h"
 #include "farfield/instance_data.h"
 #include "import/fog_options.h"
+#include "import/mesh_tile.h"
 #include "import/subdivision_options.h"
 
 namespace farfield {
@@ -39,6 +40,8 @@ struct GltfMesh {
   FogOptions fog;                           ///< of that file
   std::string model;                        ///< OBJ or PLY file, relative to the scene's folder; empty: none
   std::optional<SubdivisionScheme> scheme;  ///< of that file; none: as the caller asks
+  MeshTile tile;                            ///< which part of mesh number `whole` it is
+  uint32_t whole = 0;                       ///< of a tile: index into GltfScene::meshes
 
   bool is_empty() const { return triangle_count == 0 && volume.empty(); }
 };
@@ -105,8 +108,8 @@ struct GltfScene {
   /// Subtracted from all that stands in the world, in double precision: map coordinates leave a float no digits. The
   /// middle of the scene if that lies far from 0 for its size, else 0.
   dvec3 origin_world{0.0};
-  /// All meshes of the file under their numbers, instanced or not, then assemblies, then files of nodes. Of equal ones
-  /// only the first is instanced.
+  /// All meshes of the file under their numbers, instanced or not, then assemblies, then files of nodes, then tiles of
+  /// any of these. Of equal ones only the first is instanced; what is cut into tiles is not.
   std::vector<GltfMesh> meshes;
   /// Of the default scene, in the order of a depth-first walk: all that are to be seen at some time, where they stand
   /// at time 0 or, if their transform is singular then (a plant that grows from nothing), as soon as it is not.

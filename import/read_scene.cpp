@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "import/read_scene.h"
 
+#include "base/result.h"
 #include "import/read_volume.h"
+#include "import/scene_tiles.h"
 
 namespace farfield {
 
 Result<GltfScene> read_scene(const std::filesystem::path& path, const SceneOptions& options) {
-  if (!is_volume_file(path)) return read_gltf_scene(path, options.assemblies);
+  if (!is_volume_file(path)) {
+    FARFIELD_TRY_LET(auto scene, read_gltf_scene(path, options.assemblies));
+    if (options.tile_triangles > 0) cut_into_tiles(scene, options.tile_triangles);
+    return scene;
+  }
   FARFIELD_TRY_LET(const auto extent, read_volume_extent(path, options.fog));
   GltfMesh volume;
   volume.name = volume.asset_name = path.stem().string();

@@ -62,7 +62,7 @@ uint64_t with_options(uint64_t hash, const ImportOptions& options) {
   hash = mix64(hash, static_cast<uint64_t>(options.mesh));
   if (options.node >= 0) hash = mix64(hash, static_cast<uint64_t>(options.node));
   const uint64_t subdivision = hash_of(options.subdivision);
-  return subdivision == 0 ? hash : mix64(hash, subdivision);
+  return tile_hash(subdivision == 0 ? hash : mix64(hash, subdivision), options.tile);
 }
 
 /// Files that are not there do not count.

@@ -9,12 +9,14 @@
 #include <vector>
 
 #include "import/fog_options.h"
+#include "import/mesh_tile.h"
 #include "import/source_mesh.h"
 #include "import/subdivision_options.h"
 
 namespace farfield {
 
 class GltfParts;
+class KnownMesh;
 
 /// The hashes of what was read already, so that asking about each of many meshes reads their file once. Files
 /// are taken not to change meanwhile. One thread at a time.
@@ -41,10 +43,12 @@ class FileHashes {
 struct ImportOptions {
   int mesh =
       -1;  ///< glTF only: import this mesh alone, in its own space; -1: all nodes of the default scene, flattened
-  int node = -1;  ///< glTF only: import all that this node of the file and those below show, in the node's own space
+  int node = -1;    ///< glTF only: import all that this node of the file and those below show, in the node's own space
+  MeshTile tile{};  ///< import_asset() gives only this part of the mesh
   SubdivisionOptions subdivision{};    ///< of meshes; read_source() gives the cage, import_asset() what becomes of it
   FogOptions fog{};                    ///< OpenVDB files only: what read_volume() is given
   FileHashes* known_hashes = nullptr;  ///< hashes are looked for there first; null: they read
+  KnownMesh* known_mesh = nullptr;     ///< import_asset() keeps there what tiles are cut from; null: each tile reads it
 };
 
 /// Reads the file and those that it refers to. Content decides what a file is where it says so, its name otherwise.

@@ -57,6 +57,24 @@ float finest_footprint(std::span<const TessellationCamera> cameras, const Box3& 
   return finest;
 }
 
+double covered_pixels(std::span<const TessellationCamera> cameras, const Box3& bounds_world) {
+  if (bounds_world.is_empty()) return 0;
+  const dvec3 size = dvec3(bounds_world.upper) - dvec3(bounds_world.lower);
+  const dvec3 middle = 0.5 * (dvec3(bounds_world.lower) + dvec3(bounds_world.upper));
+  const dvec3 side_area(size.y * size.z, size.z * size.x, size.x * size.y);
+  double most = 0;
+  for (const TessellationCamera& camera : cameras) {
+    const dvec3 view = middle - dvec3(camera.position);
+    const double distance = std::max(glm::length(view), 0.25 * glm::length(size));
+    const bool has_direction = camera.pixel_spread > 0 && glm::length(view) > 0;
+    const dvec3 cosines = has_direction ? glm::abs(glm::normalize(view)) : dvec3(1.0);  // all three: not too few
+    const double pixel = camera.pixel_width + camera.pixel_spread * distance;
+    const double pixels = pixel > 0 ? glm::dot(cosines, side_area) / (pixel * pixel) : INFINITY;
+    most = std::max(most, pixels);
+  }
+  return most;
+}
+
 LevelBlend split_lambda(float lambda) {
   constexpr float kFarBeyondAnyLevel = 1e6f;
   if (!(lambda > 0.0f)) return {0, 0.0f};

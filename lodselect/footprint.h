@@ -17,6 +17,11 @@ float lambda_of_footprint(float footprint, float base_resolution, int coarsest_l
 /// The finest (smallest) footprint that any of the cameras has on a box: at the box's nearest point. World space.
 float finest_footprint(std::span<const TessellationCamera> cameras, const Box3& bounds_world);
 
+/// About how many pixels a box covers in the camera that sees most of it, as from the distance of its middle and at
+/// least a quarter of its diagonal, whatever is in its way or off the screen. Infinite where pixels have no width, 0
+/// for an empty box or without cameras. World space.
+double covered_pixels(std::span<const TessellationCamera> cameras, const Box3& bounds_world);
+
 /// The two levels a lambda lies between and where: level = floor(lambda), blend = lambda - level in [0, 1).
 struct LevelBlend {
   int level;

@@ -41,7 +41,7 @@ SceneBakeOptions scene_bake_options(const RenderOptions& options) {
   bake.finest_grid = options.finest_grid;
   bake.rays_per_voxel = options.rays_per_voxel;
   bake.source_only = options.full_detail;
-  bake.read = {options.assemblies, options.fog};
+  bake.read = {options.assemblies, options.fog, options.tile_triangles};
   bake.downsampling = options.downsampling;
   bake.subdivision = options.subdivision;
   return bake;
@@ -89,6 +89,8 @@ std::vector<std::string> bake_command(const RenderOptions& options, const SceneB
                                       fmt::format("{}", bake.rays_per_voxel),
                                       "--assemblies",
                                       name_of(bake.read.assemblies),
+                                      "--tile-triangles",
+                                      fmt::format("{}", bake.read.tile_triangles),
                                       "--downsampling",
                                       name_of(bake.downsampling),
                                       "--threads",

@@ -192,7 +192,7 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::prepare(const RenderOption
 
   if (!is_volume_file(options.scene) && !canonical_text(options.fog).empty())
     options.warning("flags of volumes are for a volume alone; a scene's nodes say theirs (docs/scene_format.md)");
-  FARFIELD_TRY_LET(auto scene, read_scene(options.scene, {options.assemblies, options.fog}));
+  FARFIELD_TRY_LET(auto scene, read_scene(options.scene, {options.assemblies, options.fog, options.tile_triangles}));
   for (const std::string& warning : scene.warnings) options.warning(warning);  // before an error may come
   FARFIELD_TRY_LET(const auto camera, find_camera(scene, options.camera));
   renderer->camera_ = camera;

@@ -13,7 +13,7 @@
 #include "base/job.h"
 #include "base/result.h"
 #include "farfield/runtime.h"
-#include "import/gltf_scene.h"
+#include "import/read_scene.h"
 #include "path_tracer/integrator.h"
 
 namespace farfield {
@@ -45,6 +45,7 @@ struct RenderOptions {
   uint32_t finest_grid = 512;                         ///< of assets that have to be baked first
   uint32_t rays_per_voxel = 200;                      ///< the same: SceneBakeOptions::rays_per_voxel
   AssemblyRule assemblies = AssemblyRule::Repeated;   ///< which subtrees of the scene are baked as one
+  uint64_t tile_triangles = kTileTriangles;           ///< SceneOptions::tile_triangles
   FogOptions fog;                                     ///< of a scene that is a volume alone
   Downsampling downsampling = Downsampling::Matched;  ///< of volumes that have to be baked
   SubdivisionOptions subdivision;                     ///< of all meshes of the scene

@@ -49,6 +49,7 @@ fs::path asset_folder(const SceneBakeOptions& options, const GltfMesh& mesh) {
 }
 
 fs::path asset_source(const SceneBakeOptions& options, const GltfMesh& mesh) {
+  // A tile has the names of its mesh.
   const std::string& own_file = mesh.volume.empty() ? mesh.model : mesh.volume;
   return own_file.empty() ? options.scene : options.scene.parent_path() / own_file;
 }
@@ -66,9 +67,11 @@ BakeOptions asset_bake_options(const SceneBakeOptions& options, const GltfScene&
   bake.import.subdivision = options.subdivision;
   bake.import.subdivision.scheme = scene.meshes[mesh].scheme.value_or(options.subdivision.scheme);
   if (scene.meshes[mesh].model.empty()) {
+    const bool is_tile = scene.meshes[mesh].tile.is_part();
     bake.import.node = scene.meshes[mesh].node;
-    if (bake.import.node < 0) bake.import.mesh = static_cast<int>(mesh);
+    if (bake.import.node < 0) bake.import.mesh = static_cast<int>(is_tile ? scene.meshes[mesh].whole : mesh);
   }
+  bake.import.tile = scene.meshes[mesh].tile;
   bake.import.known_hashes = &hashes;
   return bake;
 }
@@ -84,16 +87,26 @@ Result<size_t> bake_scene_assets(const SceneBakeOptions& options) {
 
   size_t failed = 0;
   FileHashes hashes;  // the scene is read once for them, however many assets it has
+  KnownMesh whole;    // and a mesh once for its tiles, which follow each other
+  TextureFiles textures_of_tiles;
   const std::vector<size_t> numbers = numbers_to_bake(options, scene);
   free_memory(scene.instances);  // a million take as much as a bake
   for (size_t i = 0; i < numbers.size(); ++i) {
     const GltfMesh& mesh = scene.meshes[numbers[i]];
     BakeOptions how = asset_bake_options(options, scene, numbers[i], hashes);
+    how.import.known_mesh = &whole;
+    if (mesh.tile.is_part())
+      how.known_textures = textures_of_tiles;
+    else
+      whole.forget();
     how.job = job_of_asset(options.job, mesh.asset_name, i, numbers.size());
     if (options.begin) options.begin(mesh.asset_name);
     const auto report = bake(asset_source(options, mesh), asset_folder(options, mesh), how);
     if (!report && report.error().code == ErrorCode::Cancelled) return tl::unexpected(report.error());
     if (!report) ++failed;
+    if (report && mesh.tile.is_part())
+      for (const AssetTexture& texture : report->manifest.textures)
+        textures_of_tiles.try_emplace(texture.file_hash, asset_folder(options, mesh) / texture.file);
     if (options.end) options.end(mesh.asset_name, report);
     malloc_trim(0);  // the next one starts as small as in a process of its own
   }

@@ -53,6 +53,7 @@ class CollapsibleMesh {
   std::vector<uint32_t> version;  ///< per vertex: how often it changed
   std::vector<double> deviation;  ///< per vertex: bound of the distance to the input around it
   std::vector<uint8_t> is_fixed;  ///< per face: keeps its corners where they are; empty: none does
+  std::vector<uint8_t> is_pinned;  ///< per vertex: stays where it is; empty: none does
 
   /// Call once the arrays of positions, triangles and materials are filled.
   void build_topology() {
@@ -108,6 +109,7 @@ class CollapsibleMesh {
         if (triangles[face][c] == b) triangles[face][c] = a;
       }
     }
+    if (!is_pinned.empty()) is_pinned[a] |= is_pinned[b];
     merged_into[b] = a;
     stars_.clear(b);
     stars_.replace(a, kept);
@@ -328,6 +330,8 @@ class Simplifier {
     const auto accept = [&](const Placement& placement) -> std::optional<Placement> {
       return is_valid(a, b, placement) ? std::optional(placement) : std::nullopt;
     };
+    if (is_pinned(a) || is_pinned(b))
+      return may_merge_into_pinned(a, b) ? accept(keep_vertex(ring_, is_pinned(a) ? pa : pb)) : std::nullopt;
     const auto optimum = [&] { return closest_position(ring_, 0.5 * (pa + pb), tolerance); };
     if (kind_a_ == VertexKind::Interior && kind_b_ == VertexKind::Interior) {
       const dvec3 x = optimum();
@@ -342,6 +346,15 @@ class Simplifier {
     }
     const bool stays_at_a = kind_b_ == VertexKind::Interior || kind_a_ == VertexKind::Corner;
     return accept(keep_vertex(ring_, stays_at_a ? pa : pb));
+  }
+
+  bool is_pinned(uint32_t vertex) const { return !mesh_.is_pinned.empty() && mesh_.is_pinned[vertex] != 0; }
+
+  /// Whether the one that is not pinned may go to where the other is: not if it leaves a border or a corner by that.
+  bool may_merge_into_pinned(uint32_t a, uint32_t b) const {
+    if (is_pinned(a) && is_pinned(b)) return false;
+    const VertexKind stays = is_pinned(a) ? kind_a_ : kind_b_, goes = is_pinned(a) ? kind_b_ : kind_a_;
+    return goes == VertexKind::Interior || (goes == VertexKind::Curve && stays != VertexKind::Interior);
   }
 
   dvec3 chosen_between(const dvec3& closest, const dvec3& same_volume) const {
@@ -444,6 +457,9 @@ CollapsibleMesh extract_part(const Surface& surface, const EdgeCollapseOptions& 
   const auto vertices = parts.vertices_of(part);
   if (!options.deviation.empty()) {
     for (size_t v = 0; v < vertices.size(); ++v) mesh.deviation[v] = options.deviation[vertices[v]];
+  }
+  if (!options.is_pinned.empty()) {
+    for (const uint32_t vertex : vertices) mesh.is_pinned.push_back(options.is_pinned[vertex]);
   }
   if (!options.is_fixed.empty()) {
     for (const uint32_t face : parts.faces_of(part)) mesh.is_fixed.push_back(options.is_fixed[face]);

@@ -21,6 +21,7 @@ struct EdgeCollapseOptions {
   double resolution = 0;              ///< r_k in scene units. <= 0: nothing collapses
   std::span<const uint8_t> is_fixed;  ///< per face: none of its corners moves or merges. Empty: none is
   std::span<const float> deviation;   ///< per vertex: how far the surface there may be from the input already. Empty: 0
+  std::span<const uint8_t> is_pinned = {};  ///< per vertex: stays where it is; others may merge into it. Empty: none
   VertexPlacement placement = VertexPlacement::EqualArea;  ///< others are for comparisons
 };
 

@@ -12,6 +12,7 @@
 #include "base/hash.h"
 #include "base/index.h"
 #include "base/result.h"
+#include "prefilter/cut_tile.h"
 #include "prefilter/subdivide.h"
 #include "prefilter/triangulate.h"
 #include "prefilter/weld.h"
@@ -278,13 +279,42 @@ Result<ImportedAsset> condition_mesh(SourceMesh& mesh, const std::string& name, 
   return asset;
 }
 
+Result<ImportedAsset> import_tile(const fs::path& path, const ImportOptions& options, const Job& job) {
+  KnownMesh own;
+  FARFIELD_TRY_LET(const ImportedAsset* whole,
+                   (options.known_mesh ? *options.known_mesh : own).import(path, options, job));
+  ImportedAsset tile;
+  tile.source = cut_tile(whole->source, options.tile);
+  if (tile.source.triangles.empty()) {
+    return make_error(ErrorCode::BadFile, fmt::format("{}: {} faces make no {} tiles; ask for fewer", path.string(),
+                                                      whole->source.triangles.size(), options.tile.count));
+  }
+  tile.source_hash = tile_hash(whole->source_hash, options.tile);
+  tile.source_files = whole->source_files;
+  if (options.tile.number == 0) tile.warnings = whole->warnings;
+  return tile;
+}
+
 }  // namespace
 
 Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name, const Job& job) {
   return with_warnings(condition_mesh(mesh, name, job), mesh.warnings);
 }
 
+Result<const ImportedAsset*> KnownMesh::import(const fs::path& path, const ImportOptions& options, const Job& job) {
+  std::string name = fmt::format("{} mesh={} node={} grid={} {}", path.string(), options.mesh, options.node,
+                                 options.subdivision.grid, canonical_text(options.subdivision));
+  if (mesh_ && name_ == name) return &*mesh_;
+  mesh_.reset();
+  ImportOptions whole = options;
+  whole.tile = {};
+  FARFIELD_TRY_LET(mesh_, import_asset(path, whole, job));
+  name_ = std::move(name);
+  return &*mesh_;
+}
+
 Result<ImportedAsset> import_asset(const fs::path& path, const ImportOptions& options, const Job& job) {
+  if (options.tile.is_part()) return import_tile(path, options, job);
   FARFIELD_TRY_LET(auto cage, read_source(path, options));
   FARFIELD_TRY_LET(auto mesh, subdivide(std::move(cage), options.subdivision, path.string(), job));
   return condition(std::move(mesh), path.string(), job);

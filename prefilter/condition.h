@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,7 +32,22 @@ struct ImportedAsset {
 /// cannot work in), Cancelled; with the mesh's warnings.
 Result<ImportedAsset> condition(SourceMesh mesh, const std::string& name, const Job& job = {});
 
-/// read_source(), which hears no cancel, subdivide() and condition(). Errors: those of all three.
+/// The mesh that tiles were last cut from, so that its many tiles read it once. Files are taken not to change
+/// meanwhile. One thread at a time.
+class KnownMesh {
+ public:
+  /// The whole mesh, whatever tile the options want. Valid until the next call. Errors: those of import_asset().
+  Result<const ImportedAsset*> import(const std::filesystem::path& path, const ImportOptions& options, const Job& job);
+  /// Gives its memory back.
+  void forget() { mesh_.reset(); }
+
+ private:
+  std::string name_;  ///< what it is, as import_asset() was asked for it
+  std::optional<ImportedAsset> mesh_;
+};
+
+/// read_source(), which hears no cancel, subdivide() and condition(), then cut_tile(). The first tile of a mesh has the
+/// warnings of all. Errors: those of all three; BadFile (fewer faces than tiles).
 Result<ImportedAsset> import_asset(const std::filesystem::path& path, const ImportOptions& options = {},
                                    const Job& job = {});
 

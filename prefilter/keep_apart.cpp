@@ -94,10 +94,12 @@ std::vector<uint32_t> nearest_sources(const Surface& before, const SimplifyResul
 
 class Walls {
  public:
-  Walls(const Surface& before, float resolution, SimplifyResult& after, std::vector<uint32_t> part_before)
+  Walls(const Surface& before, float resolution, SimplifyResult& after, std::vector<uint32_t> part_before,
+        std::span<const uint8_t> is_pinned)
       : before_(before),
         surface_(after.surface),
         resolution_(resolution),
+        is_pinned_(is_pinned),
         part_before_(std::move(part_before)),
         sources_(nearest_sources(before, after)),
         start_(after.surface.positions) {
@@ -314,6 +316,9 @@ class Walls {
         }
       }
     }
+    for (size_t v = 0; v < is_pinned_.size(); ++v) {
+      if (is_pinned_[v]) moves[v] = vec3(0.0f);
+    }
     leave_faces_standing(moves);
     for (size_t v = 0; v < moves.size(); ++v) surface_.positions[v] = moved(v, moves[v]);
     return static_cast<uint64_t>(std::ranges::count_if(moves, [](const vec3& move) { return move != vec3(0.0f); }));
@@ -356,6 +361,7 @@ class Walls {
   const Surface& before_;
   Surface& surface_;
   const float resolution_;
+  const std::span<const uint8_t> is_pinned_;
   const std::vector<uint32_t> part_before_;  ///< per vertex before
   const std::vector<uint32_t> sources_;      ///< per vertex after: the vertex before that stands for it
   const std::vector<vec3> start_;            ///< positions after the simplification
@@ -367,11 +373,12 @@ class Walls {
 
 }  // namespace
 
-Result<ApartReport> keep_apart(const Surface& macrosurface, float resolution, SimplifyResult& simplified) {
+Result<ApartReport> keep_apart(const Surface& macrosurface, float resolution, SimplifyResult& simplified,
+                               std::span<const uint8_t> is_pinned) {
   if (!(resolution > 0)) return ApartReport{};
   const SurfaceParts parts = find_parts(macrosurface);
   if (parts.size() < 2) return ApartReport{};
-  return Walls(macrosurface, resolution, simplified, parts_of_vertices(macrosurface, parts)).keep_apart();
+  return Walls(macrosurface, resolution, simplified, parts_of_vertices(macrosurface, parts), is_pinned).keep_apart();
 }
 
 }  // namespace farfield

@@ -3,6 +3,9 @@
 // between them: the inner would come through the outer (thesis 10.3). What crosses is moved back.
 #pragma once
 
+#include <cstdint>
+#include <span>
+
 #include "base/result.h"
 #include "prefilter/simplify.h"
 #include "prefilter/surface.h"
@@ -22,6 +25,8 @@ struct ApartReport {
 /// so that some may still cross. Parts that touch or cross in the macrosurface may do so afterwards, and where parts
 /// are only near each other over less than the square of twice the resolution, nothing moves. Faces, maps and materials
 /// stay. Deterministic for any thread count. Errors: those of RayScene::build().
-Result<ApartReport> keep_apart(const Surface& macrosurface, float resolution, SimplifyResult& simplified);
+/// is_pinned: per vertex of `simplified`, those that stay; empty: none.
+Result<ApartReport> keep_apart(const Surface& macrosurface, float resolution, SimplifyResult& simplified,
+                               std::span<const uint8_t> is_pinned = {});
 
 }  // namespace farfield

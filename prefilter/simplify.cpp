@@ -170,8 +170,8 @@ Result<SimplifyMethod> parse_simplify_method(const std::string& name) {
 }
 
 SimplifyResult simplify(const Surface& macrosurface, const SimplifyOptions& options, const Job& job) {
-  if (options.method == SimplifyMethod::Edges || !macrosurface.has_quads()) {
-    SimplifyResult result = collapse_edges(macrosurface, {options.resolution, {}, {}}, job);
+  if (options.method == SimplifyMethod::Edges || !macrosurface.has_quads() || !options.is_pinned.empty()) {
+    SimplifyResult result = collapse_edges(macrosurface, {options.resolution, {}, {}, options.is_pinned}, job);
     result.surface.quad.clear();  // nobody asks for them any more
     return result;
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,8 @@ Result<SimplifyMethod> parse_simplify_method(const std::string& name);  ///< aut
 struct SimplifyOptions {
   float resolution = 0;  ///< r_k in scene units; collapsing stops at edges of about half of it. <= 0: nothing collapses
   SimplifyMethod method = SimplifyMethod::Auto;
+  std::span<const uint8_t> is_pinned =
+      {};  ///< per vertex: stays where it is, and all of it collapses as Edges. Empty: none
 };
 
 /// A simplified surface and where everything went; kMorphVoxelized and kMorphCollapsed are in cache/level.h.

@@ -26,6 +26,7 @@ struct SourceSurface {
   std::vector<uint32_t> material;     ///< per triangle: index into `materials`
   std::vector<uint32_t> source_face;  ///< per triangle: the polygon of the file that it is a part of
   std::vector<uint32_t> quad;         ///< per triangle, as Surface::quad: halves of polygons with four corners
+  std::vector<uint8_t> on_cut;  ///< per vertex: other tiles have it too, it stays where it is; empty: this is no tile
   std::vector<SourceMaterial> materials;
   MaterialFunction material_function;    ///< the host's, if it has one: then `materials` give names only
   MaterialBatchFunction material_batch;  ///< answers as material_function, many places at once; may be empty

@@ -116,7 +116,7 @@ CloseUp::CloseUp(const std::filesystem::path& folder, const Manifest& manifest, 
   const auto open = [&](const TextureRef& map) {
     if (!map) return Map{};
     const AssetTexture& texture = manifest.textures[map.texture];
-    return Map{textures.add(folder / texture.file, map.wrap_u, map.wrap_v), static_cast<int>(texture.channels),
+    return Map{textures.add(folder, texture, map.wrap_u, map.wrap_v), static_cast<int>(texture.channels),
                vec2(texture.width, texture.height)};
   };
   for (const AssetMaterial& from : manifest.materials) {
@@ -127,7 +127,6 @@ CloseUp::CloseUp(const std::filesystem::path& folder, const Manifest& manifest, 
     to.has_maps = to.mask_map || std::ranges::any_of(to.maps(), [](const Map* map) { return bool(*map); });
     has_maps_ |= to.has_maps;
   }
-  for (const AssetTexture& texture : manifest.textures) textures.add_bytes(texture.cache_bytes);
 }
 
 float CloseUp::opacity(const LevelView& level, const SurfacePoint& point) const {

@@ -14,6 +14,8 @@ namespace {
 
 // A camera footprint's share of an image: no instance counts for more pixels than a frame has.
 constexpr double kLargestPixelCount = 1e7;
+// From here on it is worth another look at how many they are.
+constexpr double kManyPixels = 1e4;
 
 }  // namespace
 
@@ -69,7 +71,12 @@ std::vector<PlanAsset> FramePlanner::wanted_assets(const LevelStore& levels) con
     const double diagonal = glm::length(geometry_.assets[instance.asset]->bounds.size());
     const double pixel = instance.footprint.camera_footprint * instance.footprint.world_to_r0;
     const double across = pixel > 0.0 ? options_.pixel_error * diagonal / pixel : kLargestPixelCount;
-    asset.ask(wanted_lambda(instance), std::min(across * across, kLargestPixelCount));
+    double pixels = std::min(across * across, kLargestPixelCount);
+    // Its nearest point says too much of a ground, of which most is far and seen at a slant.
+    if (pixels > kManyPixels && !cameras_.empty()) {
+      pixels = std::min(pixels, covered_pixels(cameras_, geometry_.bounds_over_time(i)));
+    }
+    asset.ask(wanted_lambda(instance), pixels);
   }
   return wanted;
 }

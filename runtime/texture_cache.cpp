@@ -15,8 +15,11 @@ constexpr uint64_t kOverheadBytes = uint64_t{1} << 20;
 
 }  // namespace
 
-uint32_t TextureCache::add(const std::filesystem::path& file, Wrap wrap_u, Wrap wrap_v) {
-  files_.push_back({file.string(), wrap_u, wrap_v});
+uint32_t TextureCache::add(const std::filesystem::path& folder, const AssetTexture& texture, Wrap wrap_u, Wrap wrap_v) {
+  const auto [first, is_new] =
+      first_with_.try_emplace({texture.file_hash, texture.file_bytes}, (folder / texture.file).string());
+  if (is_new) texture_bytes_ += texture.cache_bytes;
+  files_.push_back({first->second, wrap_u, wrap_v});
   return static_cast<uint32_t>(files_.size() - 1);
 }
 

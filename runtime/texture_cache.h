@@ -5,8 +5,10 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/texture_module.h"
@@ -21,10 +23,9 @@ class TextureCache {
  public:
   explicit TextureCache(Messages& messages) : messages_(messages) {}
 
-  /// A texture of an asset, by its file.
-  uint32_t add(const std::filesystem::path& file, Wrap wrap_u, Wrap wrap_v);
-  /// What all textures of an asset take in memory.
-  void add_bytes(uint64_t bytes) { texture_bytes_ += bytes; }
+  /// A texture of the asset in `folder`. Files of the same content, as tiles of a mesh have them, are read and counted
+  /// once.
+  uint32_t add(const std::filesystem::path& folder, const AssetTexture& texture, Wrap wrap_u, Wrap wrap_v);
 
   /// What the cache wants of a budget: all of its textures, or the share that pages them; 0 without textures.
   uint64_t wanted_bytes(uint64_t budget_bytes) const;
@@ -44,9 +45,10 @@ class TextureCache {
   };
 
   Messages& messages_;
-  std::vector<File> files_;                ///< per texture
-  std::unique_ptr<TextureLookup> lookup_;  ///< once it has got room
-  uint32_t known_files_ = 0;               ///< to lookup_
+  std::vector<File> files_;                                          ///< per texture
+  std::map<std::pair<uint64_t, uint64_t>, std::string> first_with_;  ///< hash and bytes of a file: where it is
+  std::unique_ptr<TextureLookup> lookup_;                            ///< once it has got room
+  uint32_t known_files_ = 0;                                         ///< to lookup_
   bool has_room_ = false;
   bool is_missing_ = false;  ///< OpenImageIO's module does not load
   uint64_t texture_bytes_ = 0;

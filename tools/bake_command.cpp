@@ -27,6 +27,7 @@ struct BakeArguments {
   std::string source, output, report;
   bool whole_scene = false;
   AssemblyRule assemblies = AssemblyRule::Repeated;
+  uint64_t tile_triangles = kTileTriangles;
   Part part;
   int parent = 0;  // process that started this one for itself; 0: nobody did
   int threads = 0;
@@ -75,7 +76,7 @@ Result<void> bake_scene(const BakeArguments& arguments) {
   options.coarsest_grid = arguments.options.coarsest_grid;
   options.rays_per_voxel = arguments.options.rays_per_voxel;
   options.source_only = arguments.options.source_only;
-  options.read = {arguments.assemblies, arguments.options.import.fog};
+  options.read = {arguments.assemblies, arguments.options.import.fog, arguments.tile_triangles};
   options.subdivision = arguments.options.import.subdivision;
   options.downsampling = arguments.options.downsampling;
   options.part = arguments.part.number;
@@ -184,11 +185,13 @@ void add_bake_command(CLI::App& app, Action& action) {
                                       "glTF: bake each asset of the scene, into folders in the one given by -o, as "
                                       "render and shot do")
                            ->excludes(command->get_option("--mesh"))
-                           ->excludes(command->get_option("--node"));
+                           ->excludes(command->get_option("--node"))
+                           ->excludes(command->get_option("--tile"));
   add_parsed_option(command, "--assemblies", arguments->assemblies, parse_assembly_rule,
                     "With --scene, what is one asset: repeated, marked, none")
       ->default_str(name_of(arguments->assemblies))
       ->needs(scene);
+  add_tiles_flag(command, arguments->tile_triangles)->needs(scene);
   add_parsed_option(command, "--part", arguments->part, parse_part,
                     "With --scene, only each N-th asset from number I on: I/N, for processes that share the work")
       ->default_str("0/1")

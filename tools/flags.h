@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <string>
 
 #include "base/result.h"
@@ -22,6 +23,15 @@ CLI::Option* add_parsed_option(CLI::App* app, const std::string& flag, T& target
     target = *value;
   };
   return app->add_option_function<std::string>(flag, read, help);
+}
+
+/// SceneOptions::tile_triangles.
+inline CLI::Option* add_tiles_flag(CLI::App* app, uint64_t& tile_triangles) {
+  return app
+      ->add_option("--tile-triangles", tile_triangles,
+                   "Grounds (wide, flat and heavy) are baked as tiles of up to so many triangles; 0: whole")
+      ->check(CLI::Range(uint64_t{0}, uint64_t{1} << 32))
+      ->capture_default_str();
 }
 
 }  // namespace farfield::tool

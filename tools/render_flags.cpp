@@ -79,6 +79,7 @@ void add_picture_flags(CLI::App* command, RenderArguments& arguments, const std:
                     "What is baked as one: trees of several meshes that the scene repeats, or only what it marks, or "
                     "nothing: repeated, marked, none")
       ->default_str(name_of(options.assemblies));
+  add_tiles_flag(command, options.tile_triangles);
   command->add_option("--threads", arguments.threads, "0: as many as the machine has")
       ->check(CLI::Range(0, 4096))
       ->capture_default_str();

@@ -5,14 +5,23 @@
 
 #include "bake/bake.h"
 #include "import/subdivision_options.h"
+#include "tools/args.h"
 #include "tools/flags.h"
 
 namespace farfield::tool {
 
-/// Which part of a glTF file: a mesh or a node.
+/// Which part of a glTF file: a mesh or a node; and which tile of that, or of any model.
 inline void add_part_flags(CLI::App* command, ImportOptions& options, const char* mesh_help, const char* node_help) {
   CLI::Option* mesh = command->add_option("--mesh", options.mesh, mesh_help)->check(CLI::Range(0, 1 << 20));
   command->add_option("--node", options.node, node_help)->check(CLI::Range(0, 1 << 30))->excludes(mesh);
+  const auto parse_tile = [](const std::string& text) -> Result<MeshTile> {
+    const auto part = parse_part(text);
+    if (!part) return tl::unexpected(part.error());
+    return MeshTile{part->number, part->count};
+  };
+  add_parsed_option(command, "--tile", options.tile, parse_tile,
+                    "Only tile I of the N that it is cut into, I/N: as render and shot bake grounds of a scene")
+      ->default_str("0/1");
 }
 
 /// What a mesh does not say itself.

@@ -18,7 +18,7 @@
 #include "base/parallel.h"
 #include "base/process_time.h"
 #include "base/result.h"
-#include "import/gltf_scene.h"
+#include "import/read_scene.h"
 #include "path_tracer/asset_library.h"
 #include "path_tracer/render_session.h"
 #include "path_tracer/scene_setup.h"
@@ -105,7 +105,8 @@ Result<void> measure_frame(Way& levels, Way& full, const Camera& camera, const L
 }
 
 Result<void> measure(const RenderOptions& options, int rounds, const std::vector<int>& frames) {
-  FARFIELD_TRY_LET(const auto scene, read_gltf_scene(options.scene, options.assemblies));
+  FARFIELD_TRY_LET(const auto scene,
+                   read_scene(options.scene, {options.assemblies, options.fog, options.tile_triangles}));
   std::vector<std::string> ignored;
   FARFIELD_TRY_LET(const auto lights, make_lights(scene, options, ignored));
   FARFIELD_TRY_LET(const auto device, make_embree_device(thread_count()));

@@ -86,8 +86,8 @@ const std::vector<std::string> kCommands = {"bake",   "info", "verify", "evaluat
 TEST(Help, OfEveryCommandHasAnExampleAndEveryFlagOfTheContract) {
   const std::vector<std::vector<std::string>> flags = {
       {"--output", "--finest-grid", "--coarsest-grid", "--threads", "--report", "--mesh", "--node", "--scene",
-       "--assemblies", "--source-only"},
-      {"--json", "--mesh", "--node"},
+       "--assemblies", "--tile-triangles", "--tile", "--source-only"},
+      {"--json", "--mesh", "--node", "--tile"},
       {},
       {"--source", "--other-source", "--levels", "--views", "--spp", "--json", "--sheet", "--images"},
       {"--level", "--output", "--report"},

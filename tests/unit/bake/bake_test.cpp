@@ -6,11 +6,14 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <array>
 #include <csignal>
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <set>
 #include <thread>
+#include <tuple>
 
 #include "bake/bake_workspace.h"
 #include "bake/measure_levels.h"
@@ -19,6 +22,8 @@
 #include "bvh/level_scene.h"
 #include "bvh/ray_cost.h"
 #include "cache/level_file.h"
+#include "prefilter/cut_tile.h"
+#include "prefilter/edge_table.h"
 #include "tests/support/files.h"
 #include "tests/support/random_unit.h"
 #include "tests/support/source_surfaces.h"
@@ -565,6 +570,70 @@ TEST_F(Bake, KeepsTexturesAndStoresNoLevelThatTakesMoreThanThey) {
   std::ofstream(out() / "texture_0.tif", std::ios::app) << "x";
   EXPECT_FALSE(bake(textured_square(64), "square", out(), small_options())->up_to_date);
   EXPECT_EQ(files_of(out()), before);
+}
+
+TEST_F(Bake, LinksTexturesThatAnotherAssetHas) {
+  const auto first = bake(textured_square(64), "square", folder_ / "first.farfield", small_options());
+  ASSERT_TRUE(first.has_value());
+  const fs::path texture = folder_ / "first.farfield" / "texture_0.tif";
+  BakeOptions options = small_options();
+  options.known_textures = {{first->manifest.textures[0].file_hash, texture}};
+  ASSERT_TRUE(bake(textured_square(64), "square", out(), options).has_value());
+  EXPECT_TRUE(fs::equivalent(texture, out() / "texture_0.tif"));
+  EXPECT_EQ(files_of(out()), files_of(folder_ / "first.farfield"));
+
+  // What is not what it is said to be, or is not there any more, is not linked to.
+  for (const char* other : {"other.tif", "gone.tif"}) {
+    if (std::string(other) == "other.tif") test::write_text(folder_ / other, "something else");
+    options.known_textures = {{first->manifest.textures[0].file_hash, folder_ / other}};
+    options.even_if_up_to_date = true;
+    ASSERT_TRUE(bake(textured_square(64), "square", out(), options).has_value());
+    EXPECT_EQ(files_of(out()), files_of(folder_ / "first.farfield"));
+    EXPECT_FALSE(fs::equivalent(texture, out() / "texture_0.tif"));
+  }
+}
+
+/// The edges at the border of a surface, by their ends.
+std::set<std::array<float, 6>> border_of(const std::vector<vec3>& positions, const std::vector<uvec3>& triangles) {
+  const EdgeTable edges = build_edge_table(triangles, positions.size());
+  std::set<std::array<float, 6>> border;
+  for (uint32_t e = 0; e < edges.size(); ++e) {
+    if (edges.faces_of(e).size() != 1) continue;
+    vec3 a = positions[edges.smaller_vertex[e]], b = positions[edges.larger_vertex[e]];
+    if (std::tie(a.x, a.y, a.z) > std::tie(b.x, b.y, b.z)) std::swap(a, b);
+    border.insert({a.x, a.y, a.z, b.x, b.y, b.z});
+  }
+  return border;
+}
+
+TEST_F(Bake, TilesKeepTheirCutsInAllLevels) {
+  const Surface hills = test::make_grid(
+      48, 48, false, [](float u, float v) { return vec3(u, 0.03f * std::sin(15 * u) * std::cos(13 * v), v); });
+  const auto rim = border_of(hills.positions, hills.triangles);
+  for (const uint32_t number : {0u, 3u}) {
+    ImportedAsset tile = test::asset_of(hills);
+    tile.source = cut_tile(tile.source, {number, 4});
+    std::set<std::array<float, 6>> cut = border_of(tile.source.positions, tile.source.triangles);
+    for (const auto& edge : rim) cut.erase(edge);
+    ASSERT_GE(cut.size(), 48u);
+    BakeOptions options = small_options();
+    options.import.tile = {number, 4};
+    options.surfaces_only = true;
+    size_t faces = tile.source.triangles.size(), levels = 0;
+    options.see_surfaces = [&](const LevelSurfaces& level) -> Result<void> {
+      const auto border = border_of(level.simplified.positions, level.simplified.triangles);
+      EXPECT_TRUE(std::ranges::includes(border, cut)) << "level " << level.level;
+      EXPECT_EQ(level.sub_resolution.triangles.size(), 0u) << "borders are not eaten, level " << level.level;
+      EXPECT_LE(level.simplified.triangles.size(), faces);
+      faces = level.simplified.triangles.size();
+      ++levels;
+      return {};
+    };
+    const auto report = bake(std::move(tile), "hills", folder_ / fmt::format("{}", number), options);
+    ASSERT_TRUE(report.has_value()) << report.error().message;
+    EXPECT_EQ(levels, 4u);
+    EXPECT_LT(faces, 4 * cut.size()) << "inside, levels are as coarse as ever";
+  }
 }
 
 TEST_F(Bake, RefusesSenselessOptions) {

@@ -147,6 +147,29 @@ TEST(FinestFootprint, SurvivesHugeDistances) {
   EXPECT_EQ(finest_footprint(std::span(&far, 1), Box3{vec3(-1.0f), vec3(1.0f)}), kInf);
 }
 
+TEST(CoveredPixels, AreThoseOfTheMiddleAndOfTheSlant) {
+  const TessellationCamera camera{vec3(0.0f), 0.0f, 0.01f};
+  const auto of = [&](const Box3& box) { return covered_pixels(std::span(&camera, 1), box); };
+  EXPECT_NEAR(of({vec3(-1, -1, 99), vec3(1, 1, 101)}), 4, 0.01);  // pixels of 1 x 1, a cube of 2 x 2
+  const Box3 below{vec3(-100, -2, -100), vec3(100, -1, 100)}, ahead{vec3(200, -2, -100), vec3(400, -1, 100)};
+  EXPECT_GT(of(below), 100 * of(ahead)) << "a ground ahead is seen at a slant";
+  EXPECT_NEAR(of(ahead), (200 * 200 * (1.5 / 300) + 200) / 9, 0.5);
+  EXPECT_GT(of({vec3(-1e9f), vec3(1e9f)}), 0) << "all around the camera";
+  EXPECT_EQ(of(Box3()), 0);
+  EXPECT_EQ(covered_pixels({}, below), 0);
+  EXPECT_EQ(of({vec3(1), vec3(1)}), 0) << "a point";
+}
+
+TEST(CoveredPixels, OfTheCameraThatSeesMost) {
+  const TessellationCamera cameras[] = {{vec3(0, 0, 1000), 0, 0.01f}, {vec3(0, 0, 10), 0, 0.01f}, {vec3(0), 0.5f, 0}};
+  const Box3 box{vec3(-1), vec3(1)};
+  EXPECT_NEAR(covered_pixels(std::span(cameras, 1), box), 0.04, 0.001);
+  EXPECT_NEAR(covered_pixels(std::span(cameras, 2), box), 400, 1);
+  EXPECT_EQ(covered_pixels(std::span(cameras + 2, 1), box), 48) << "orthographic: at most so many";
+  const TessellationCamera points{vec3(0), 0, 0};
+  EXPECT_EQ(covered_pixels(std::span(&points, 1), box), INFINITY);
+}
+
 TEST(TessellationCamera, AsksForLessOfWhatItDoesNotSee) {
   auto perspective = TessellationCamera::perspective({0, 0, 0}, {0, 0, -1}, {0, 1, 0}, 1.5707963f, 200, 100);
   auto orthographic = TessellationCamera::orthographic({0, 0, 0}, {0, 0, -2}, {0, 1, 0}, 4.0f, 200, 100);
