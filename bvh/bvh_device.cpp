@@ -73,21 +73,26 @@ Result<std::unique_ptr<BvhDevice>> BvhDevice::create() {
 }
 
 Result<MeasuredScene> build_measured_scene(BvhDevice& device, const std::function<std::vector<EmbreeGeometry>()>& make,
-                                           uint64_t most_bytes, std::string_view what) {
+                                           const BuildTerms& terms, std::string_view what) {
   forget_embree_error(device.handle());  // not ours
 
-  BuildMeter meter(most_bytes);
+  BuildMeter meter(terms.most_bytes);
   MeasuredScene result;
   const std::vector<EmbreeGeometry> geometries = make();
-  result.scene = build_static_scene(device.handle(), geometries);
+  result.scene = build_static_scene(device.handle(), geometries, terms.cancel);
   const auto count = static_cast<uint64_t>(
       std::ranges::count_if(geometries, [](const EmbreeGeometry& geometry) { return geometry != nullptr; }));
   const uint64_t overheads = kSceneOverheadBytes + count * kGeometryOverheadBytes;  // what it does not report is small
   result.bytes = meter.bytes() + overheads;
   result.build_peak_bytes = meter.peak_bytes();
-  if (meter.is_limit_exceeded() || result.bytes > most_bytes) {
+  if (terms.is_cancelled()) {
     forget_embree_error(device.handle());
-    return make_error(ErrorCode::OutOfBudget, fmt::format("{} takes more than {}", what, format_bytes(most_bytes)));
+    return make_error(ErrorCode::Cancelled, fmt::format("{} is no longer wanted", what));
+  }
+  if (meter.is_limit_exceeded() || result.bytes > terms.most_bytes) {
+    forget_embree_error(device.handle());
+    return make_error(ErrorCode::OutOfBudget,
+                      fmt::format("{} takes more than {}", what, format_bytes(terms.most_bytes)));
   }
   FARFIELD_TRY(check_embree(device.handle(), fmt::format("build {}", what)));
   return result;

@@ -40,6 +40,14 @@ class BvhDevice {
 /// As much memory as there is.
 inline constexpr uint64_t kAnyBytes = std::numeric_limits<uint64_t>::max();
 
+/// What a build may do.
+struct BuildTerms {
+  uint64_t most_bytes = kAnyBytes;            ///< that Embree gets, at the worst moment
+  const std::atomic<bool>* cancel = nullptr;  ///< polled meanwhile; once true, the build fails with Cancelled
+
+  bool is_cancelled() const { return cancel && cancel->load(std::memory_order_relaxed); }  // relaxed: it guards nothing
+};
+
 /// What Embree does not report: scene objects, geometry objects and malloc's rounding, measured on 3.13.5.
 inline constexpr uint64_t kSceneOverheadBytes = 3072;
 inline constexpr uint64_t kGeometryOverheadBytes = 300;
@@ -52,10 +60,10 @@ struct MeasuredScene {
 };
 
 /// Builds a scene of what `make` makes (see build_static_scene) on the calling thread alone, so that the same
-/// geometries always take the same bytes, and those bytes can be told from what other threads build meanwhile. Embree
-/// gets no more than `most_bytes`, at the worst moment. what: for messages, "the BVH of 8 quads". Errors: OutOfBudget
-/// (most_bytes are not enough), Io (out of memory, or what else Embree says).
+/// geometries always take the same bytes, and those bytes can be told from what other threads build meanwhile. what:
+/// for messages, "the BVH of 8 quads". Errors: OutOfBudget (most_bytes are not enough), Cancelled, Io (out of memory,
+/// or what else Embree says).
 Result<MeasuredScene> build_measured_scene(BvhDevice& device, const std::function<std::vector<EmbreeGeometry>()>& make,
-                                           uint64_t most_bytes, std::string_view what);
+                                           const BuildTerms& terms, std::string_view what);
 
 }  // namespace farfield

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <thread>
 #include <vector>
 
@@ -65,7 +66,7 @@ TEST(LevelScene, BuildsOfSeveralThreadsAreToldApart) {
         EXPECT_EQ(cost->build_peak_bytes, alone[i % 2]->build_peak_bytes);
         // One that may not take so much fails alone.
         const uint64_t enough = cost->resident_bytes + cost->build_peak_bytes;
-        const auto refused = LevelScene::build(**device, view_of(soups[i % 2]), enough / 2);
+        const auto refused = LevelScene::build(**device, view_of(soups[i % 2]), {enough / 2});
         ASSERT_FALSE(refused);
         EXPECT_EQ(refused.error().code, ErrorCode::OutOfBudget);
       }
@@ -90,15 +91,33 @@ TEST(LevelScene, ABuildThatWouldTakeMoreThanItMayStopsThereAndIsForgotten) {
   for (const double share : {0.0, 0.01, 0.3, 0.6, 0.9, 0.99}) {
     const uint64_t held = d.bytes();
     const auto most = static_cast<uint64_t>(share * static_cast<double>(enough));
-    const auto scene = LevelScene::build(d, view_of(soup), most);
+    const auto scene = LevelScene::build(d, view_of(soup), {most});
     ASSERT_FALSE(scene) << share;
     EXPECT_EQ(scene.error().code, ErrorCode::OutOfBudget);
     EXPECT_EQ(d.bytes(), held) << share;  // nothing is left of it, in Embree's sum or in ours
   }
-  const auto again = LevelScene::build(d, view_of(soup), enough);
+  const auto again = LevelScene::build(d, view_of(soup), {enough});
   ASSERT_TRUE(again) << again.error().message;
   EXPECT_EQ(again->bytes(), free->bytes());
   EXPECT_GT(d.bytes(), before);
+}
+
+TEST(LevelScene, ABuildCanBeCancelledAndIsForgotten) {
+  const LevelData soup = triangle_soup(300000, 0.005f, 2);
+  const auto device = BvhDevice::create();
+  ASSERT_TRUE(device);
+  const auto once = LevelScene::build(**device, view_of(soup));
+  ASSERT_TRUE(once);
+  const uint64_t before = (*device)->bytes();
+  std::atomic<bool> cancel{true};
+  const auto never = LevelScene::build(**device, view_of(soup), {kAnyBytes, &cancel});
+  ASSERT_FALSE(never);
+  EXPECT_EQ(never.error().code, ErrorCode::Cancelled);
+  EXPECT_EQ((*device)->bytes(), before);
+  cancel = false;
+  const auto again = LevelScene::build(**device, view_of(soup), {kAnyBytes, &cancel});
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->bytes(), once->bytes());
 }
 
 TEST(LevelScene, CostDoesNotDependOnTheNumberOfThreads) {
