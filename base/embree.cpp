@@ -46,7 +46,8 @@ Result<void> check_embree(EmbreeDeviceRef device, std::string_view task) {
   return make_error(ErrorCode::Io, fmt::format("Embree cannot {}: {}", task, words_for(error)));
 }
 
-EmbreeScene build_static_scene(EmbreeDeviceRef device, std::span<const EmbreeGeometry> geometries) {
+EmbreeScene build_static_scene(EmbreeDeviceRef device, std::span<const EmbreeGeometry> geometries,
+                               const std::atomic<bool>* cancel) {
   EmbreeScene scene = new_scene(device);
   rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_MEDIUM);
   for (unsigned id = 0; id < geometries.size(); ++id) {
@@ -56,7 +57,14 @@ EmbreeScene build_static_scene(EmbreeDeviceRef device, std::span<const EmbreeGeo
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(scene.get(), geometry, id);
   }
+  if (cancel) {
+    const auto may_go_on = [](void* flag, double) {
+      return !static_cast<const std::atomic<bool>*>(flag)->load(std::memory_order_relaxed);
+    };
+    rtcSetSceneProgressMonitorFunction(scene.get(), may_go_on, const_cast<std::atomic<bool>*>(cancel));
+  }
   tbb::task_arena(1).execute([&] { rtcCommitScene(scene.get()); });
+  if (cancel) rtcSetSceneProgressMonitorFunction(scene.get(), nullptr, nullptr);  // the flag may go before the scene
   return scene;
 }
 

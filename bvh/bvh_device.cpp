@@ -5,6 +5,7 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <limits>
 #include <thread>
 #include <utility>
 
@@ -12,27 +13,52 @@
 
 namespace farfield {
 
+namespace {
+
+/// What Embree takes for the build that this thread does, and the most that it may.
+class BuildMeter {
+ public:
+  explicit BuildMeter(uint64_t most_bytes) : most_bytes_(static_cast<int64_t>(std::min(most_bytes, kNoLimit))) {
+    of_this_thread = this;
+  }
+  ~BuildMeter() { of_this_thread = nullptr; }
+  BuildMeter(const BuildMeter&) = delete;
+  BuildMeter& operator=(const BuildMeter&) = delete;
+
+  /// False: it must not take them.
+  bool take(int64_t bytes) {
+    if (bytes > 0 && bytes_ + bytes > most_bytes_) {
+      is_limit_exceeded_ = true;
+      return false;
+    }
+    bytes_ += bytes;
+    peak_bytes_ = std::max(peak_bytes_, bytes_);
+    return true;
+  }
+  uint64_t bytes() const { return static_cast<uint64_t>(std::max<int64_t>(bytes_, 0)); }
+  /// Further ones at the worst moment.
+  uint64_t peak_bytes() const { return static_cast<uint64_t>(peak_bytes_) - std::min<uint64_t>(peak_bytes_, bytes()); }
+  bool is_limit_exceeded() const { return is_limit_exceeded_; }
+
+  static thread_local BuildMeter* of_this_thread;
+
+ private:
+  static constexpr uint64_t kNoLimit = std::numeric_limits<int64_t>::max();
+  const int64_t most_bytes_;
+  int64_t bytes_ = 0, peak_bytes_ = 0;
+  bool is_limit_exceeded_ = false;
+};
+
+thread_local BuildMeter* BuildMeter::of_this_thread = nullptr;
+
+}  // namespace
+
 bool BvhDevice::on_memory(void* self, ssize_t bytes, bool /*post*/) {
-  auto& device = *static_cast<BvhDevice*>(self);
-  const int64_t now = device.bytes_.fetch_add(bytes, std::memory_order_relaxed) + bytes;
-  if (bytes > 0 && now > device.limit_bytes_.load(std::memory_order_relaxed)) {
-    device.bytes_.fetch_sub(bytes, std::memory_order_relaxed);  // Embree does not take it, and does not give it back
-    device.is_limit_exceeded_.store(true, std::memory_order_relaxed);
-    return false;
-  }
-  int64_t peak = device.peak_bytes_.load(std::memory_order_relaxed);
-  while (now > peak && !device.peak_bytes_.compare_exchange_weak(peak, now, std::memory_order_relaxed)) {
-  }
+  // A build takes and gives back memory on its own thread: see build_static_scene.
+  BuildMeter* meter = BuildMeter::of_this_thread;
+  if (meter && !meter->take(bytes)) return false;  // Embree does not take it, and does not give it back
+  static_cast<BvhDevice*>(self)->bytes_.fetch_add(bytes, std::memory_order_relaxed);
   return true;
-}
-
-void BvhDevice::set_limit(uint64_t bytes) {
-  limit_bytes_.store(static_cast<int64_t>(std::min<uint64_t>(bytes, kNoLimit)), std::memory_order_relaxed);
-}
-
-bool BvhDevice::end_limit() {
-  limit_bytes_.store(kNoLimit, std::memory_order_relaxed);
-  return is_limit_exceeded_.exchange(false, std::memory_order_relaxed);
 }
 
 Result<std::unique_ptr<BvhDevice>> BvhDevice::create() {
@@ -47,26 +73,26 @@ Result<std::unique_ptr<BvhDevice>> BvhDevice::create() {
 }
 
 Result<MeasuredScene> build_measured_scene(BvhDevice& device, const std::function<std::vector<EmbreeGeometry>()>& make,
-                                           uint64_t most_bytes, std::string_view what) {
-  const std::lock_guard lock(device.build_mutex());
-  const uint64_t bytes_before = device.bytes();
-  device.reset_peak();
+                                           const BuildTerms& terms, std::string_view what) {
   forget_embree_error(device.handle());  // not ours
 
-  // Up to here Embree may go; what it does not report is small.
-  device.set_limit(bytes_before + std::min(most_bytes, kAnyBytes - bytes_before));
+  BuildMeter meter(terms.most_bytes);
   MeasuredScene result;
   const std::vector<EmbreeGeometry> geometries = make();
-  result.scene = build_static_scene(device.handle(), geometries);
+  result.scene = build_static_scene(device.handle(), geometries, terms.cancel);
   const auto count = static_cast<uint64_t>(
       std::ranges::count_if(geometries, [](const EmbreeGeometry& geometry) { return geometry != nullptr; }));
-  const uint64_t overheads = kSceneOverheadBytes + count * kGeometryOverheadBytes;
-  const uint64_t bytes_after = device.bytes();
-  result.bytes = bytes_after - std::min(bytes_before, bytes_after) + overheads;
-  result.build_peak_bytes = device.peak_bytes() - std::min(device.peak_bytes(), bytes_after);
-  if (device.end_limit() || result.bytes > most_bytes) {
+  const uint64_t overheads = kSceneOverheadBytes + count * kGeometryOverheadBytes;  // what it does not report is small
+  result.bytes = meter.bytes() + overheads;
+  result.build_peak_bytes = meter.peak_bytes();
+  if (terms.is_cancelled()) {
     forget_embree_error(device.handle());
-    return make_error(ErrorCode::OutOfBudget, fmt::format("{} takes more than {}", what, format_bytes(most_bytes)));
+    return make_error(ErrorCode::Cancelled, fmt::format("{} is no longer wanted", what));
+  }
+  if (meter.is_limit_exceeded() || result.bytes > terms.most_bytes) {
+    forget_embree_error(device.handle());
+    return make_error(ErrorCode::OutOfBudget,
+                      fmt::format("{} takes more than {}", what, format_bytes(terms.most_bytes)));
   }
   FARFIELD_TRY(check_embree(device.handle(), fmt::format("build {}", what)));
   return result;

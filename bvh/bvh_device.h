@@ -7,7 +7,6 @@
 #include <functional>
 #include <limits>
 #include <memory>
-#include <mutex>
 #include <string_view>
 #include <vector>
 
@@ -17,7 +16,7 @@
 namespace farfield {
 
 /// An Embree device with a memory monitor. Not the host's: a device has one monitor slot, and the host may use its own.
-/// Builds are serialised by build_mutex(), so that bytes can be told apart and only one build peak exists at a time.
+/// Any threads may build scenes of it at the same time.
 class BvhDevice {
  public:
   /// Keeps the number of TBB threads that the process is limited to now: a default device would lift the limit.
@@ -27,36 +26,27 @@ class BvhDevice {
   BvhDevice& operator=(const BvhDevice&) = delete;
 
   EmbreeDeviceRef handle() const { return device_.get(); }
-  std::mutex& build_mutex() { return build_mutex_; }
-
   /// Bytes that Embree has reported for this device and not given back.
   uint64_t bytes() const { return static_cast<uint64_t>(bytes_.load(std::memory_order_relaxed)); }
-  /// The largest bytes() since reset_peak().
-  uint64_t peak_bytes() const { return static_cast<uint64_t>(peak_bytes_.load(std::memory_order_relaxed)); }
-  void reset_peak() { peak_bytes_.store(bytes_.load(std::memory_order_relaxed), std::memory_order_relaxed); }
-
-  /// Embree gets no memory that would take bytes() above this: the build in progress then fails. For builds, under
-  /// build_mutex().
-  void set_limit(uint64_t bytes);
-  /// Takes the limit away. True: Embree has asked for more than one of the limits since the last call.
-  bool end_limit();
 
  private:
   BvhDevice() = default;
-  static constexpr int64_t kNoLimit = std::numeric_limits<int64_t>::max();
   static bool on_memory(void* self, ssize_t bytes, bool post);
 
-  std::mutex build_mutex_;
-  // relaxed: only counters; whoever compares them holds build_mutex_ and has joined the build's threads.
-  std::atomic<int64_t> bytes_{0};
-  std::atomic<int64_t> peak_bytes_{0};
-  std::atomic<int64_t> limit_bytes_{kNoLimit};
-  std::atomic<bool> is_limit_exceeded_{false};
-  EmbreeDevice device_;  // last, so released first: what it gives back is still counted
+  std::atomic<int64_t> bytes_{0};  // relaxed: only a counter
+  EmbreeDevice device_;            // last, so released first: what it gives back is still counted
 };
 
 /// As much memory as there is.
 inline constexpr uint64_t kAnyBytes = std::numeric_limits<uint64_t>::max();
+
+/// What a build may do.
+struct BuildTerms {
+  uint64_t most_bytes = kAnyBytes;            ///< that Embree gets, at the worst moment
+  const std::atomic<bool>* cancel = nullptr;  ///< polled meanwhile; once true, the build fails with Cancelled
+
+  bool is_cancelled() const { return cancel && cancel->load(std::memory_order_relaxed); }  // relaxed: it guards nothing
+};
 
 /// What Embree does not report: scene objects, geometry objects and malloc's rounding, measured on 3.13.5.
 inline constexpr uint64_t kSceneOverheadBytes = 3072;
@@ -70,10 +60,10 @@ struct MeasuredScene {
 };
 
 /// Builds a scene of what `make` makes (see build_static_scene) on the calling thread alone, so that the same
-/// geometries always take the same bytes. Embree gets no more than `most_bytes`, at the worst moment. Holds
-/// device.build_mutex(). what: for messages, "the BVH of 8 quads". Errors: OutOfBudget (most_bytes are not enough), Io
-/// (out of memory, or what else Embree says).
+/// geometries always take the same bytes, and those bytes can be told from what other threads build meanwhile. what:
+/// for messages, "the BVH of 8 quads". Errors: OutOfBudget (most_bytes are not enough), Cancelled, Io (out of memory,
+/// or what else Embree says).
 Result<MeasuredScene> build_measured_scene(BvhDevice& device, const std::function<std::vector<EmbreeGeometry>()>& make,
-                                           uint64_t most_bytes, std::string_view what);
+                                           const BuildTerms& terms, std::string_view what);
 
 }  // namespace farfield

@@ -45,8 +45,9 @@ float blend_of(float t) {
 
 }  // namespace
 
-SlotBlend split_slots(const TracedAsset& asset, float lambda) {
-  const std::vector<uint8_t>& usable = asset.usable_slots;
+SlotBlend split_slots(const TracedAsset& asset, float lambda) { return split_slots(asset, asset.usable_slots, lambda); }
+
+SlotBlend split_slots(const TracedAsset& asset, std::span<const uint8_t> usable, float lambda) {
   size_t i = 0;
   while (i + 1 < usable.size() && asset.level_numbers[usable[i + 1]] <= lambda) ++i;
   if (i + 1 == usable.size()) return {usable[i], usable[i], 0.0f};

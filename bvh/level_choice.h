@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "bvh/traced_asset.h"
 #include "farfield/camera.h"
@@ -27,6 +28,8 @@ struct SlotBlend {
   float blend;       ///< in [0, 1); 0 at the root
 };
 SlotBlend split_slots(const TracedAsset& asset, float lambda);
+/// The same under another plan.
+SlotBlend split_slots(const TracedAsset& asset, std::span<const uint8_t> usable, float lambda);
 
 struct LevelChoice {
   uint32_t slot;    ///< stored level

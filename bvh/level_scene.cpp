@@ -12,7 +12,7 @@
 
 namespace farfield {
 
-Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, uint64_t most_bytes,
+Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, const BuildTerms& terms,
                                      EmbreeFilter filter, void* user) {
   LevelScene result;
   if (!level.has_surface()) return result;
@@ -25,8 +25,8 @@ Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, 
     if (filter) set_filter(quads, filter, user);
     return geometries;
   };
-  FARFIELD_TRY_LET(result.built_, build_measured_scene(device, make, most_bytes,
-                                                       fmt::format("the BVH of {} quads", level.quads.size())));
+  FARFIELD_TRY_LET(result.built_,
+                   build_measured_scene(device, make, terms, fmt::format("the BVH of {} quads", level.quads.size())));
   return result;
 }
 

@@ -18,9 +18,9 @@ class LevelScene {
   LevelScene() = default;
   /// The level's arrays are shared, not copied: they stay where they are until this is destroyed, but only this call
   /// reads them. Four bytes after the last position must be readable (level files see to that), because Embree loads
-  /// vertices 16 bytes at a time. `filter`, if there is one, is asked about every hit, with `user`. most_bytes, errors:
+  /// vertices 16 bytes at a time. `filter`, if there is one, is asked about every hit, with `user`. terms, errors:
   /// those of build_measured_scene().
-  static Result<LevelScene> build(BvhDevice& device, const LevelView& level, uint64_t most_bytes = kAnyBytes,
+  static Result<LevelScene> build(BvhDevice& device, const LevelView& level, const BuildTerms& terms = {},
                                   EmbreeFilter filter = nullptr, void* user = nullptr);
 
   EmbreeSceneRef handle() const { return built_.scene.get(); }  ///< null without a surface

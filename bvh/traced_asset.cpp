@@ -6,7 +6,7 @@
 namespace farfield {
 
 Result<std::unique_ptr<TracedLevel>> TracedLevel::build(BvhDevice& device, const LevelView& level, uint32_t slot,
-                                                        const SurfaceLook* look, uint64_t most_bytes) {
+                                                        const SurfaceLook* look, const BuildTerms& terms) {
   std::unique_ptr<TracedLevel> traced(new TracedLevel);
   traced->view = level;
   traced->volume = BrickVolume(level);
@@ -14,8 +14,8 @@ Result<std::unique_ptr<TracedLevel>> TracedLevel::build(BvhDevice& device, const
   traced->face_count = farfield::face_count(level);
   traced->voxel_count = farfield::voxel_count(level);
   traced->look = look;
-  FARFIELD_TRY_LET(traced->scene, LevelScene::build(device, level, most_bytes,
-                                                    is_opaque(level) ? nullptr : opacity_filter, traced.get()));
+  FARFIELD_TRY_LET(traced->scene,
+                   LevelScene::build(device, level, terms, is_opaque(level) ? nullptr : opacity_filter, traced.get()));
   return traced;
 }
 

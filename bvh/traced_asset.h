@@ -42,9 +42,9 @@ struct TracedLevel {
   uint32_t voxel_count = 0;
   const SurfaceLook* look = nullptr;  ///< null: faces are on average everywhere what they are on average
 
-  /// Builds the BVH, within most_bytes. Errors: those of LevelScene::build.
+  /// Builds the BVH, within terms. Errors: those of LevelScene::build.
   static Result<std::unique_ptr<TracedLevel>> build(BvhDevice& device, const LevelView& level, uint32_t slot,
-                                                    const SurfaceLook* look = nullptr, uint64_t most_bytes = kAnyBytes);
+                                                    const SurfaceLook* look = nullptr, const BuildTerms& terms = {});
   TracedLevel(const TracedLevel&) = delete;
   TracedLevel& operator=(const TracedLevel&) = delete;
 

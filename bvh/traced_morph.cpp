@@ -218,7 +218,7 @@ Result<std::unique_ptr<TracedMorph>> TracedMorph::make(BvhDevice& device, const 
     return geometries;
   };
   const uint64_t left = most_bytes - std::min(most_bytes, morph->making_bytes_);
-  FARFIELD_TRY_LET(morph->built_, build_measured_scene(device, make_geometries, left,
+  FARFIELD_TRY_LET(morph->built_, build_measured_scene(device, make_geometries, {left},
                                                        fmt::format("the morph of {} faces", faces.count())));
   return morph;
 }

@@ -1,7 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cache/loader_thread.h"
 
+#include <sys/resource.h>
+
 namespace farfield {
+
+namespace {
+
+// On Linux this is about the calling thread alone. A failure only means that it competes with rays.
+void lower_priority() {
+  constexpr int kNicer = 10;
+  ::setpriority(PRIO_PROCESS, 0, ::getpriority(PRIO_PROCESS, 0) + kNicer);
+}
+
+}  // namespace
 
 LoaderThread::~LoaderThread() {
   {
@@ -28,11 +40,16 @@ void LoaderThread::request(size_t item) {
   changed_.notify_all();
 }
 
-void LoaderThread::forget() {
-  std::unique_lock lock(mutex_);
+void LoaderThread::clear() {
+  const std::lock_guard lock(mutex_);
   queue_.clear();
-  changed_.wait(lock, [&] { return !is_busy_; });
   for (std::atomic<bool>& flag : requested_) flag.store(false, std::memory_order_relaxed);
+}
+
+void LoaderThread::forget() {
+  clear();
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return !is_busy_; });
 }
 
 void LoaderThread::drain() {
@@ -41,6 +58,7 @@ void LoaderThread::drain() {
 }
 
 void LoaderThread::run() {
+  if (priority_ == Priority::Low) lower_priority();
   std::unique_lock lock(mutex_);
   while (true) {
     changed_.wait(lock, [&] { return is_stopping_ || !queue_.empty(); });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The thread that loads levels while rays go on with coarser ones (Residency::Progressive).
+// A thread that loads levels while rays go on: with coarser ones (Residency::Progressive), or ahead of the next frame.
 #pragma once
 
 #include <atomic>
@@ -12,10 +12,13 @@
 namespace farfield {
 
 /// Loads requested items one after the other, first come first served. request() is safe from any thread; the rest is
-/// for one thread at a time, with no request() running. The thread starts with the first request.
+/// for one thread at a time, with no request() running. The thread starts with the first request. One of low priority
+/// gets what processor time others leave.
 class LoaderThread {
  public:
-  explicit LoaderThread(std::function<void(size_t item)> load) : load_(std::move(load)) {}
+  enum class Priority { Normal, Low };
+  explicit LoaderThread(std::function<void(size_t item)> load, Priority priority = Priority::Normal)
+      : load_(std::move(load)), priority_(priority) {}
   ~LoaderThread();
   LoaderThread(const LoaderThread&) = delete;
   LoaderThread& operator=(const LoaderThread&) = delete;
@@ -24,7 +27,9 @@ class LoaderThread {
   void resize(size_t count);
   /// Asks for an item, once: further requests for it are one atomic read, until forget().
   void request(size_t item);
-  /// Drops what is waiting, waits for the load that runs, and lets every item be requested again.
+  /// Drops what is waiting, and lets every item be requested again.
+  void clear();
+  /// The same, and waits for the load that runs.
   void forget();
   /// Waits until everything that was requested is done.
   void drain();
@@ -33,6 +38,7 @@ class LoaderThread {
   void run();
 
   const std::function<void(size_t)> load_;
+  const Priority priority_;
   std::deque<std::atomic<bool>> requested_;  ///< relaxed: only keeps the queue short
 
   std::mutex mutex_;

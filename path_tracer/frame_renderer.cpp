@@ -248,6 +248,12 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
   report.baseline_rss_bytes = resident_set_bytes();
   const PeakMemory memory;
 
+  const auto cameras_at = [&](std::span<const double> at) {
+    std::vector<Camera> cameras;
+    for (const double seconds : at)
+      cameras.push_back(make_camera(scene_, camera_, seconds, options_.width, options_.height));
+    return cameras;
+  };
   std::unique_ptr<RenderSession> session;
   for (size_t i = 0; i < frames.size(); ++i) {
     if (i > 0) {
@@ -265,15 +271,16 @@ Result<RenderReport> FrameRenderer::render(std::span<const int> frames, const Fr
       FARFIELD_TRY(session->move(instances.keys()));
     }
 
-    std::vector<Camera> cameras;
-    for (const double seconds : times)
-      cameras.push_back(make_camera(scene_, camera_, seconds, options_.width, options_.height));
+    const std::vector<Camera> cameras = cameras_at(times);
+    const bool is_last = i + 1 == frames.size();
+    const std::vector<Camera> next =
+        is_last ? std::vector<Camera>() : cameras_at(shutter_times(scene_, options_.shutter, frames[i + 1]));
     const auto done_after = [&](size_t count) {
       return static_cast<double>(count) / static_cast<double>(frames.size());
     };
     const Job job = options_.job.step(fmt::format("frame {} ({}/{})", frames[i], i + 1, frames.size()), done_after(i),
                                       done_after(i + 1));
-    FARFIELD_TRY_LET(auto frame, session->render(cameras, lights_, options_, film, job));
+    FARFIELD_TRY_LET(auto frame, session->render({cameras, next}, lights_, options_, film, job));
     frame.frame = frames[i];
     report_problems(options_, frame);
     report.frames.push_back(std::move(frame));

@@ -72,7 +72,8 @@ struct FrameReport {
   int frame = 0;
   double seconds = 0;            ///< wall time of plan, prefetch and render
   double cpu_seconds = 0;        ///< of all threads of the process meanwhile
-  double load_seconds = 0;       ///< summed over loads of levels: read, check, build
+  double load_seconds = 0;       ///< summed over loads of levels: read, check, build; also those done in frames before
+  double stall_seconds = 0;      ///< of `seconds`: prefetch, and what rays waited for levels, a mean over the threads
   uint64_t accounted_bytes = 0;  ///< that the runtime counts against the budget, after the frame
   uint64_t rss_bytes = 0;        ///< of the process after the frame
   uint64_t levels_loaded = 0;
@@ -87,6 +88,8 @@ struct FrameReport {
   std::vector<std::vector<LevelUse>> levels;  ///< per asset: its stored levels that anything happened to
   std::vector<float> levels_given_up;         ///< per asset: how many levels coarser than asked, for the budget's sake
 
+  /// The share of its time in which it waited for levels.
+  double stall() const { return seconds > 0 ? stall_seconds / seconds : 0.0; }
   /// The picture is not what was planned: a level was lost or did not fit, which the warnings say.
   bool is_degraded() const { return fallbacks > 0; }
 };

@@ -8,6 +8,7 @@
 #include <chrono>
 
 #include "base/bytes.h"
+#include "base/parallel.h"
 #include "base/process_memory.h"
 #include "base/process_time.h"
 #include "base/result.h"
@@ -37,6 +38,19 @@ RuntimeOptions runtime_options(const RenderOptions& options, bool has_small_scen
     if (sink) sink(text);
   };
   return runtime;
+}
+
+std::vector<TessellationCamera> tessellation(std::span<const Camera> camera, const RenderOptions& options) {
+  std::vector<TessellationCamera> keys;
+  for (const Camera& key : camera) {
+    keys.push_back(key.tessellation());
+    keys.back().off_screen_scale = options.off_screen_scale;
+  }
+  return keys;
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 // The runtime knows what the assets and instances need that it was given so far; here all are known.
@@ -110,12 +124,7 @@ Result<void> RenderSession::move(std::span<const std::vector<GltfInstance>> keys
 }
 
 Result<PlanSummary> RenderSession::plan(std::span<const Camera> camera, const RenderOptions& options) {
-  std::vector<TessellationCamera> tessellation;
-  for (const Camera& key : camera) {
-    tessellation.push_back(key.tessellation());
-    tessellation.back().off_screen_scale = options.off_screen_scale;
-  }
-  runtime_->set_cameras(std::move(tessellation));
+  runtime_->set_cameras(tessellation(camera, options));
   return runtime_->plan_frame();
 }
 
@@ -160,24 +169,29 @@ Result<void> RenderSession::explain(const Camera& camera, const RenderOptions& o
   return {};
 }
 
-Result<FrameReport> RenderSession::render(std::span<const Camera> camera, const Lights& lights,
+Result<FrameReport> RenderSession::render(const FrameCameras& cameras, const Lights& lights,
                                           const RenderOptions& options, Film& film, const Job& job) {
   const auto start = std::chrono::steady_clock::now();
   const double cpu_start = process_cpu_seconds();
   const Stats before = runtime_->stats();
   const std::vector<std::vector<LevelRecord>> levels_before = level_stats();
-  FARFIELD_TRY_LET(auto plan, this->plan(camera, options));
+  FARFIELD_TRY_LET(auto plan, this->plan(cameras.now, options));
+  const auto prefetch_start = std::chrono::steady_clock::now();
   runtime_->prefetch();
+  const double prefetch_seconds = seconds_since(prefetch_start);
+  const double waited_before = runtime_->stats().wait_seconds;
   malloc_trim(0);  // nor is what moving and planning left there
+  runtime_->look_ahead(tessellation(cameras.next, options));
 
   const TraceScene scene{scene_.get(), runtime_.get(), &lights, &ids_};
-  FARFIELD_TRY_LET(const auto traced, path_trace(scene, camera, options.trace, film, job));
+  FARFIELD_TRY_LET(const auto traced, path_trace(scene, cameras.now, options.trace, film, job));
 
   const Stats after = runtime_->stats();
   FrameReport report;
-  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  report.seconds = seconds_since(start);
   report.cpu_seconds = process_cpu_seconds() - cpu_start;
   report.load_seconds = after.load_seconds - before.load_seconds;
+  report.stall_seconds = prefetch_seconds + (after.wait_seconds - waited_before) / thread_count();
   report.accounted_bytes = after.accounted_bytes;
   report.rss_bytes = resident_set_bytes();
   report.levels_loaded = after.levels_loaded - before.levels_loaded;

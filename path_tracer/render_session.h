@@ -33,9 +33,13 @@ class RenderSession {
   /// of the same meshes in the same order. Errors: those of Runtime::move_instance.
   Result<void> move(std::span<const std::vector<GltfInstance>> keys);
 
-  /// Plans for the camera (its keys: see path_trace()), loads, and renders into the film. The report's frame number is
-  /// not set. Errors: those of plan_frame and path_trace.
-  Result<FrameReport> render(std::span<const Camera> camera, const Lights& lights, const RenderOptions& options,
+  /// The keys of cameras (see path_trace()) of a frame and of the one after it, empty if there is none.
+  struct FrameCameras {
+    std::span<const Camera> now, next;
+  };
+  /// Plans for the camera, loads, and renders into the film, while levels for the next frame are loaded. The report's
+  /// frame number is not set. Errors: those of plan_frame and path_trace.
+  Result<FrameReport> render(const FrameCameras& cameras, const Lights& lights, const RenderOptions& options,
                              Film& film, const Job& job);
 
   /// Plans for the camera and looks at the pixel that the report names. names: per shown mesh. instances: of open().

@@ -58,6 +58,8 @@ Json frame_to_json(const FrameReport& frame, const std::vector<std::string>& ass
           {"seconds", frame.seconds},
           {"cpu_seconds", frame.cpu_seconds},
           {"load_seconds", frame.load_seconds},
+          {"stall_seconds", frame.stall_seconds},
+          {"stall", frame.stall()},
           {"accounted_bytes", frame.accounted_bytes},
           {"rss_bytes", frame.rss_bytes},
           {"bias", frame.bias},
@@ -80,6 +82,7 @@ FrameReport frame_from_json(const Json& json, const std::vector<std::string>& as
   json.at("seconds").get_to(frame.seconds);
   frame.cpu_seconds = json.value("cpu_seconds", 0.0);  // absent before version 0.1
   json.at("load_seconds").get_to(frame.load_seconds);
+  frame.stall_seconds = json.value("stall_seconds", 0.0);  // absent before levels were loaded ahead
   json.at("accounted_bytes").get_to(frame.accounted_bytes);
   json.at("rss_bytes").get_to(frame.rss_bytes);
   json.at("bias").get_to(frame.bias);

@@ -85,6 +85,13 @@ Result<void> write_versioned(Struct& target, Struct value) {
 }
 
 glm::vec3 to_vec3(const float v[3]) { return {v[0], v[1], v[2]}; }
+std::vector<TessellationCamera> to_cameras(const FfCamera* cameras, size_t count) {
+  std::vector<TessellationCamera> all;
+  for (size_t i = 0; i < count; ++i) {
+    all.push_back({to_vec3(cameras[i].position), cameras[i].pixel_width, cameras[i].pixel_spread});
+  }
+  return all;
+}
 ScatterSample to_sample(const FfScatterSample& sample) {
   return {to_vec3(sample.wi), to_vec3(sample.weight), sample.pdf};
 }
@@ -237,11 +244,7 @@ FfStatus ff_limit_asset_levels(FfRuntime* runtime, uint32_t asset, uint8_t fines
 
 FfStatus ff_set_cameras(FfRuntime* runtime, const FfCamera* cameras, size_t count) {
   return guarded([&]() -> Result<void> {
-    std::vector<TessellationCamera> all;
-    for (size_t i = 0; i < count; ++i) {
-      all.push_back({to_vec3(cameras[i].position), cameras[i].pixel_width, cameras[i].pixel_spread});
-    }
-    runtime->runtime->set_cameras(std::move(all));
+    runtime->runtime->set_cameras(to_cameras(cameras, count));
     return {};
   });
 }
@@ -262,6 +265,13 @@ FfStatus ff_prefetch(FfRuntime* runtime) {
   });
 }
 
+FfStatus ff_look_ahead(FfRuntime* runtime, const FfCamera* cameras, size_t count) {
+  return guarded([&]() -> Result<void> {
+    runtime->runtime->look_ahead(to_cameras(cameras, count));
+    return {};
+  });
+}
+
 FfStatus ff_attach(FfRuntime* runtime, RTCScene scene, unsigned* geometry_id) {
   return guarded([&] { return runtime->runtime->attach(scene).map([&](unsigned id) { *geometry_id = id; }); });
 }
@@ -269,8 +279,9 @@ FfStatus ff_attach(FfRuntime* runtime, RTCScene scene, unsigned* geometry_id) {
 FfStatus ff_stats(const FfRuntime* runtime, FfStats* stats) {
   return guarded([&] {
     const Stats now = runtime->runtime->stats();
-    return write_versioned(*stats, FfStats{sizeof(FfStats), now.accounted_bytes, now.peak_accounted_bytes,
-                                           now.levels_loaded, now.levels_resident, now.fallbacks, now.load_seconds});
+    return write_versioned(*stats,
+                           FfStats{sizeof(FfStats), now.accounted_bytes, now.peak_accounted_bytes, now.levels_loaded,
+                                   now.levels_resident, now.fallbacks, now.load_seconds, now.wait_seconds});
   });
 }
 

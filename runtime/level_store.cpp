@@ -6,7 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
+
+#include "base/parallel.h"
 
 namespace farfield {
 
@@ -29,7 +32,10 @@ LevelStore::LevelStore(std::unique_ptr<BvhDevice> device, const RuntimeOptions& 
       textures_(messages),
       device_(std::move(device)),
       levels_(options.budget_bytes, [this](size_t item, const Error& error) { report_broken(item, error); }),
-      loader_([this](size_t item) { levels_.acquire(item); }) {}
+      loader_([this](size_t item) { levels_.acquire(item); }),
+      ahead_([this](size_t item) { levels_.load_ahead(item); }, LoaderThread::Priority::Low) {}
+
+LevelStore::~LevelStore() { stop_ahead(); }
 
 const TracedLevel* LevelStore::serve(uint32_t asset_index, uint32_t slot) {
   OpenAsset& asset = *assets_[asset_index];
@@ -89,7 +95,8 @@ Result<uint32_t> LevelStore::open(const std::filesystem::path& folder, MaterialF
   for (uint32_t i = 0; i < assets_.size(); ++i) {
     if (assets_[i]->folder == folder) return i;
   }
-  loader_.forget();  // its thread must not meet tables that grow, nor take the room of the root
+  loader_.forget();  // these threads must not meet tables that grow, nor take the room of the root
+  stop_ahead();
   FARFIELD_TRY_LET(auto asset, read_asset(folder, std::move(materials), textures_));
   if (auto root = load_root(*asset); !root) {
     refused_.push_back(std::move(asset));
@@ -106,8 +113,8 @@ Result<uint32_t> LevelStore::open(const std::filesystem::path& folder, MaterialF
 
 void LevelStore::add_item(OpenAsset& asset, uint32_t slot, bool is_morph, std::vector<size_t>& numbers) {
   ResidencyItem item = is_morph ? make_morph_item(asset, slot, *device_) : make_level_item(asset, slot, *device_);
-  item.load = [this, load = std::move(item.load)](uint64_t bytes_left) {
-    Result<LoadedItem> loaded = load(bytes_left);
+  item.load = [this, load = std::move(item.load)](const LoadTerms& terms) {
+    Result<LoadedItem> loaded = load(terms);
     if (loaded) count_freed(loaded->build_peak_bytes);
     return loaded;
   };
@@ -134,6 +141,7 @@ void LevelStore::add_items(OpenAsset& asset) {
     }
   }
   loader_.resize(levels_.size());
+  ahead_.resize(levels_.size());
 }
 
 Result<void> LevelStore::load_root(OpenAsset& asset) {
@@ -163,7 +171,12 @@ Result<Plan> LevelStore::plan_roots(const OpenAsset* newcomer) const {
 }
 
 Result<void> LevelStore::set_instance_bytes(uint64_t bytes) {
-  if (levels_.stats().accounted_bytes - instance_bytes_ + bytes > budget_bytes_) {
+  const auto fits = [&] { return levels_.stats().accounted_bytes - instance_bytes_ + bytes <= budget_bytes_; };
+  if (bytes > instance_bytes_ && has_ahead_room()) {
+    levels_.set_ahead_room(ahead_room_bytes_ = 0);  // what would begin now does not know of these bytes
+    if (!fits()) stop_ahead();
+  }
+  if (!fits()) {
     const uint64_t former = std::exchange(instance_bytes_, bytes);
     const Result<Plan> roots = plan_roots(nullptr);
     instance_bytes_ = former;
@@ -222,8 +235,21 @@ void LevelStore::report_no_room_for_textures(const Error& error) {
       fmt::format("close-ups have one colour per face, their textures do not fit: {}", error.message));
 }
 
-void LevelStore::apply(const Plan& plan, uint64_t texture_bytes) {
+void LevelStore::stop_loading() {
   loader_.forget();
+  ahead_.clear();
+}
+
+void LevelStore::apply(const Plan& plan, uint64_t texture_bytes) {
+  stop_loading();
+  levels_.set_ahead_room(0);  // nothing begins that the plan may not want
+  std::vector<size_t> planned;
+  for (size_t i = 0; i < plan.usable.size(); ++i) {
+    for (const uint8_t slot : plan.usable[i]) planned.push_back(assets_[i]->items[slot]);
+  }
+  std::ranges::sort(planned);
+  levels_.drop_ahead(planned);
+
   std::vector<size_t> dropped;
   for (size_t i = 0; i < plan.usable.size(); ++i) {
     OpenAsset& asset = *assets_[i];
@@ -248,18 +274,72 @@ void LevelStore::apply(const Plan& plan, uint64_t texture_bytes) {
   texture_bytes_ = texture_bytes;
   textures_.set_bytes(texture_bytes);
   levels_.set_other_bytes(fixed_bytes() + texture_bytes_);
+  const uint64_t in_use = fixed_bytes() + texture_bytes_ + plan.resident_bytes;
+  ahead_room_bytes_ = budget_bytes_ - std::min(budget_bytes_, in_use);
 }
 
-void LevelStore::load(uint32_t asset, uint32_t slot) {
-  const size_t item = assets_[asset]->items[slot];
-  if (residency_ == Residency::Wait) {
-    levels_.acquire(item);
+/// Of what the plan allows and rays have not asked for yet.
+uint64_t LevelStore::largest_peak_to_come() const {
+  uint64_t largest = 0;
+  const auto look_at = [&](size_t item) {
+    if (item != kNoItem && levels_.state(item) == ItemState::Empty)
+      largest = std::max(largest, levels_.build_peak_bytes(item));
+  };
+  for (const auto& asset : assets_) {
+    for (const uint8_t slot : asset->traced.usable_slots) look_at(asset->items[slot]);
+    for (const uint8_t slot : asset->traced.morphing_slots) look_at(asset->morph_items[slot]);
+  }
+  return largest;
+}
+
+/// So that the long ones do not come last, alone.
+std::vector<LevelSlot> LevelStore::largest_first(std::span<const LevelSlot> wanted) const {
+  std::vector<LevelSlot> sorted(wanted.begin(), wanted.end());
+  std::ranges::stable_sort(sorted, std::greater(),
+                           [&](const LevelSlot& level) { return assets_[level.asset]->levels[level.slot].file_bytes; });
+  return sorted;
+}
+
+void LevelStore::for_each_at_once(std::span<const LevelSlot> wanted,
+                                  const std::function<void(const LevelSlot&)>& load_one) {
+  std::atomic<size_t> next{0};  // relaxed: it only hands out levels, in their order
+  parallel_for(wanted.size(), 1,
+               [&](size_t, size_t) { load_one(wanted[next.fetch_add(1, std::memory_order_relaxed)]); });
+}
+
+void LevelStore::load(std::span<const LevelSlot> wanted) {
+  std::vector<LevelSlot> usable;
+  for (const LevelSlot& level : wanted) {
+    if (assets_[level.asset]->traced.is_usable(level.slot)) usable.push_back(level);
+  }
+  const auto item_of = [&](const LevelSlot& level) { return assets_[level.asset]->items[level.slot]; };
+  if (residency_ == Residency::Progressive) {
+    for (const LevelSlot& level : usable) loader_.request(item_of(level));
   } else {
-    loader_.request(item);
+    for_each_at_once(largest_first(usable), [&](const LevelSlot& level) { levels_.acquire(item_of(level)); });
   }
 }
 
-void LevelStore::load_morph(uint32_t asset, uint32_t slot) { find_morph(*assets_[asset], slot); }
+void LevelStore::load_morphs(std::span<const LevelSlot> wanted) {
+  for_each_at_once(largest_first(wanted), [&](const LevelSlot& level) {
+    OpenAsset& asset = *assets_[level.asset];
+    if (asset.traced.may_morph(level.slot)) find_morph(asset, level.slot);
+  });
+}
+
+void LevelStore::load_ahead(std::span<const LevelSlot> wanted) {
+  ahead_.clear();
+  levels_.set_ahead_room(ahead_room_bytes_ - std::min(ahead_room_bytes_, largest_peak_to_come()));
+  for (const LevelSlot& level : largest_first(wanted)) ahead_.request(assets_[level.asset]->items[level.slot]);
+}
+
+/// Nothing is being loaded ahead afterwards, and nothing that was is left.
+void LevelStore::stop_ahead() {
+  levels_.set_ahead_room(ahead_room_bytes_ = 0);
+  ahead_.clear();
+  levels_.drop_ahead();
+  ahead_.forget();
+}
 
 uint64_t LevelStore::fallbacks() const {
   uint64_t sum = 0;

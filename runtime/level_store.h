@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -23,10 +24,17 @@
 
 namespace farfield {
 
+/// A stored level of an open asset.
+struct LevelSlot {
+  uint32_t asset;
+  uint32_t slot;
+};
+
 /// serve() and stats() are safe from any thread while rays fly; the rest is for one thread, between frames.
 class LevelStore final : public LevelSource {
  public:
   LevelStore(std::unique_ptr<BvhDevice> device, const RuntimeOptions& options, Messages& messages);
+  ~LevelStore() override;
 
   // Rays
   const TracedLevel* serve(uint32_t asset, uint32_t slot) override;
@@ -55,14 +63,20 @@ class LevelStore final : public LevelSource {
 
   /// Sizes and numbers of an asset's levels, as if it had no instance.
   PlanAsset plan_asset(uint32_t i) const { return plan_asset(*assets_[i]); }
-  /// Ends what is being loaded ahead, so that sizes no longer change.
-  void stop_loading() { loader_.forget(); }
+  /// Ends what progressive rays have asked for, so that sizes no longer change, and begins no more loads ahead.
+  void stop_loading();
   /// Allows what the plan allows and gives back the rest; the cache of textures gets this much.
   void apply(const Plan& plan, uint64_t texture_bytes);
-  /// Loads a level that the plan allows; in progressive mode only asks for it.
-  void load(uint32_t asset, uint32_t slot);
-  /// The same for its morph to the next, whose levels were loaded before.
-  void load_morph(uint32_t asset, uint32_t slot);
+  /// Loads those of the levels that the plan allows, several at a time where their builds fit; in progressive mode only
+  /// asks for them, in this order.
+  void load(std::span<const LevelSlot> wanted);
+  /// The same for their morphs to the next, whose levels were loaded before.
+  void load_morphs(std::span<const LevelSlot> wanted);
+  /// Starts to load levels for a plan to come, where the plan in force leaves room. Rays do not see them. Also while
+  /// rays fly.
+  void load_ahead(std::span<const LevelSlot> wanted);
+  /// Whether that plan leaves any.
+  bool has_ahead_room() const { return ahead_room_bytes_ > 0; }
 
   ResidencyStats stats() const { return levels_.stats(); }
   /// Of all levels: LevelRecord::fallbacks.
@@ -87,6 +101,10 @@ class LevelStore final : public LevelSource {
   Result<Plan> plan_roots(const OpenAsset* newcomer) const;
   void count_freed(uint64_t bytes);
   void report_broken(size_t item, const Error& error);
+  void for_each_at_once(std::span<const LevelSlot> wanted, const std::function<void(const LevelSlot&)>& load_one);
+  std::vector<LevelSlot> largest_first(std::span<const LevelSlot> wanted) const;
+  uint64_t largest_peak_to_come() const;
+  void stop_ahead();
 
   const uint64_t budget_bytes_;
   const Residency residency_;
@@ -107,7 +125,9 @@ class LevelStore final : public LevelSource {
   std::atomic<bool> said_no_room_{false};
   std::atomic<bool> said_nested_{false};
   std::atomic<uint64_t> freed_bytes_{0};  ///< since the last malloc_trim; relaxed: a counter
-  LoaderThread loader_;                   ///< last: stops before anything else goes
+  uint64_t ahead_room_bytes_ = 0;         ///< that the plan in force leaves beside all it allows, build peaks aside
+  LoaderThread loader_;                   ///< these last: they stop before anything else goes
+  LoaderThread ahead_;
 };
 
 }  // namespace farfield

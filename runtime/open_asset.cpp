@@ -74,14 +74,16 @@ Result<void> check_level(const LevelView& level, const OpenAsset& asset, uint32_
 }
 
 Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::filesystem::path& path,
-                              BvhDevice& device, uint64_t bytes_left) {
+                              BvhDevice& device, const LoadTerms& terms) {
   auto loaded = std::make_unique<LoadedLevel>();
   FARFIELD_TRY_LET(loaded->file, LevelFile::open_known(path, asset.levels[slot].file_bytes, asset.file_hashes[slot]));
   const LevelView& view = loaded->file->view();
+  if (terms.is_cancelled()) return make_error(ErrorCode::Cancelled, fmt::format("{}: not wanted", path.string()));
   FARFIELD_TRY(check_level(view, asset, slot, path));
   const SurfaceLook* look = view.header.level == 0 ? asset.close_up.get() : nullptr;
-  const uint64_t file_bytes = level_file_sizes(view).memory_bytes;  // at most bytes_left, by check_planned_bytes()
-  auto traced = TracedLevel::build(device, view, slot, look, bytes_left - std::min(bytes_left, file_bytes));
+  const uint64_t file_bytes = level_file_sizes(view).memory_bytes;  // at most most_bytes, by check_planned_bytes()
+  const BuildTerms build{terms.most_bytes - std::min(terms.most_bytes, file_bytes), terms.cancel};
+  auto traced = TracedLevel::build(device, view, slot, look, build);
   if (!traced) {
     return make_error(
         traced.error().code,
@@ -165,15 +167,16 @@ Result<std::unique_ptr<OpenAsset>> read_asset(const std::filesystem::path& folde
 
 ResidencyItem make_level_item(const OpenAsset& asset, uint32_t slot, BvhDevice& device) {
   return {asset.levels[slot].resident_bytes, asset.build_peak_bytes[slot],
-          [&asset, slot, &device](uint64_t bytes_left) {
-            return load_level(asset, slot, asset.folder / asset.file_names[slot], device, bytes_left);
+          [&asset, slot, &device](const LoadTerms& terms) {
+            return load_level(asset, slot, asset.folder / asset.file_names[slot], device, terms);
           }};
 }
 
 ResidencyItem make_morph_item(const OpenAsset& asset, uint32_t slot, BvhDevice& device) {
   const LevelCost& cost = *asset.morph_costs[slot];
-  return {cost.resident_bytes, cost.build_peak_bytes,
-          [&asset, slot, &device](uint64_t bytes_left) { return load_morph(asset, slot, device, bytes_left); }};
+  return {cost.resident_bytes, cost.build_peak_bytes, [&asset, slot, &device](const LoadTerms& terms) {
+            return load_morph(asset, slot, device, terms.most_bytes);
+          }};
 }
 
 }  // namespace farfield

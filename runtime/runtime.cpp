@@ -308,6 +308,10 @@ Result<PlanSummary> Runtime::plan_frame() { return impl_->planner.plan(impl_->le
 
 void Runtime::prefetch() { impl_->planner.prefetch(impl_->levels); }
 
+void Runtime::look_ahead(const std::vector<TessellationCamera>& next_cameras) {
+  impl_->planner.look_ahead(impl_->levels, next_cameras);
+}
+
 Result<unsigned> Runtime::attach(RTCScene scene) { return impl_->host.attach(scene, impl_->geometry); }
 
 unsigned Runtime::geometry_id() const { return impl_->host.geometry_id(); }
@@ -355,6 +359,7 @@ Stats Runtime::stats() const {
   stats.levels_released = levels.releases;
   stats.fallbacks = impl_->levels.fallbacks();
   stats.load_seconds = levels.load_seconds;
+  stats.wait_seconds = levels.wait_seconds;
   return stats;
 }
 

@@ -6,7 +6,7 @@
 
 The shot options go to `farfield shot`, e.g. --frames 0-120:40 --size 160x90 --spp 4 --assets DIR. Assets that are missing
 are baked first. Full detail: the resident bytes of level 0 of every asset, as their manifests have them, without instances.
-Coarser: by how many levels than asked, the mean over pixels, per frame. OUT_DIR/budgets.svg shows the table.
+Coarser: by how many levels than asked, the mean over pixels, per frame. Stall: what frames waited for levels, of their time. OUT_DIR/budgets.svg shows the table.
 """
 import argparse
 import json
@@ -56,7 +56,7 @@ def main():
         sys.exit("measure_budgets: the shot fails without a budget; see " + str(arguments.out_dir / "unlimited.log"))
     full, triangles = full_detail_bytes(arguments.assets)
     print("Full detail: %d triangles, %s MiB; without a limit %.0f CPU s" % (triangles, mib(full), seconds))
-    print("\n| budget | MiB | accounted, peak | RSS over what there was before, peak | coarser, first to last frame | stall, s "
+    print("\n| budget | MiB | accounted, peak | RSS over what there was before, peak | coarser, first to last frame | stall, s (share) "
           "| CPU s |\n|---|---|---|---|---|---|---|")
     points = []
     for share in SHARES:
@@ -70,9 +70,10 @@ def main():
         rss = report["peak_rss_bytes"] - report["baseline_rss_bytes"]
         coarser = [f["bias"] for f in report["frames"]]
         points.append((budget, report["peak_accounted_bytes"], rss, sum(coarser) / len(coarser)))
-        print("| %g %% | %s | %s | %s | %s | %.1f | %.0f |" % (
+        stall, wall = (sum(f[key] for f in report["frames"]) for key in ("stall_seconds", "seconds"))
+        print("| %g %% | %s | %s | %s | %s | %.1f (%.1f %%) | %.0f |" % (
             100 * share, mib(budget), mib(report["peak_accounted_bytes"]), mib(rss), " ".join("%.2f" % c for c in coarser),
-            sum(f["load_seconds"] for f in report["frames"]), seconds), flush=True)
+            stall, 100 * stall / wall, seconds), flush=True)
     (arguments.out_dir / "budgets.svg").write_text(plot(points))
 
 

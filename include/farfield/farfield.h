@@ -116,6 +116,8 @@ typedef struct FfPlan {
 /* plan: may be null. */
 FF_API FfStatus ff_plan_frame(FfRuntime* runtime, FfPlan* plan);
 FF_API FfStatus ff_prefetch(FfRuntime* runtime);
+/* The next frame's cameras, to load for while rays of this one fly; see Runtime::look_ahead. */
+FF_API FfStatus ff_look_ahead(FfRuntime* runtime, const FfCamera* cameras, size_t count);
 FF_API FfStatus ff_attach(FfRuntime* runtime, RTCScene scene, unsigned* geometry_id);
 
 typedef struct FfStats {
@@ -126,9 +128,10 @@ typedef struct FfStats {
   uint64_t levels_resident;
   uint64_t fallbacks;
   double load_seconds;
+  double wait_seconds; /* of all threads, for levels */
 } FfStats;
 #define FF_STATS_INIT \
-  { sizeof(FfStats), 0, 0, 0, 0, 0, 0.0 }
+  { sizeof(FfStats), 0, 0, 0, 0, 0, 0.0, 0.0 }
 FF_API FfStatus ff_stats(const FfRuntime* runtime, FfStats* stats);
 
 /* A farfield::RayContext: pass `embree` to rtcIntersect1 and rtcOccluded1. */

@@ -150,6 +150,8 @@ struct Stats {
   uint64_t levels_released = 0;
   uint64_t fallbacks = 0;  ///< visits of rays to instances that a coarser level served (progressive mode, broken files)
   double load_seconds = 0;  ///< summed over loads: read, check, build
+  double wait_seconds =
+      0;  ///< summed over threads (rays, prefetch()): in which they loaded levels or waited for others
 };
 
 /// Thread rule: interaction(), stats() and all ray queries are safe from any thread at any time between two
@@ -226,9 +228,16 @@ class FARFIELD_API Runtime {
   /// first rays that need a level load it, or prefetch() does. Errors: OutOfBudget (the message has the number that
   /// would do; the former plan stays), InvalidArgument (no camera).
   Result<PlanSummary> plan_frame();
-  /// Loads what the cameras will certainly need under the current plan, ahead of the rays; in progressive mode starts
-  /// to, and returns at once. Broken levels are reported and left out.
+  /// Loads what the cameras will certainly need under the current plan, ahead of the rays, several levels at a time
+  /// where their builds fit the budget; in progressive mode starts to, and returns at once. Broken levels are reported
+  /// and left out.
   void prefetch();
+  /// A guess at the next frame's cameras: starts to load what they will certainly need, beside the rays of this frame,
+  /// in a thread of low priority and in what the plan leaves of the budget, and returns. Changes nothing that rays see
+  /// but how long they wait: the next plan_frame() keeps what its plan has and drops the rest; what fails is said when
+  /// it is needed. Call it after plan_frame() and prefetch(); a further call replaces the guess, one without cameras
+  /// ends it. Instances count where they are now. Takes as long as a plan_frame(); rays may fly meanwhile.
+  void look_ahead(const std::vector<TessellationCamera>& next_cameras);
 
   /// Puts the user geometry into the host's scene and returns its geomID; the host commits the scene. Call again after
   /// adding instances. All instances are primitives of this one geometry: primID is InstanceId::value. The scene is

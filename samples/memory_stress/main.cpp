@@ -204,6 +204,8 @@ std::vector<Picture> shoot(Forest& forest, uint64_t budget_bytes, unsigned threa
     const bool is_first = visit < kFrames;
     const size_t frame = is_first ? visit : 2 * kFrames - 1 - visit;
     coarser += host::or_fail(plan(forest, frame)).bias / (2 * kFrames);
+    // On the way there only: the pictures of the way back show that it changes none.
+    if (is_first && frame + 1 < kFrames) forest.runtime->look_ahead({forest.cameras[frame + 1].tessellation()});
     const Picture picture = render(forest, frame, is_first ? threads : 1);
     check_memory(forest, budget_bytes, "wait", frame);
     if (!is_first && picture != pictures[frame]) fail_at("wait", frame, "not the picture of the first visit");

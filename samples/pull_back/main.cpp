@@ -7,7 +7,8 @@
 //
 // Writes FOLDER/frame_000.ppm and so on, and a line per frame. `shot` (the default) plans once, for the cameras of all
 // frames: no instance changes its level for another reason than that rays came nearer or went away, and nothing is
-// loaded twice. `frame` plans anew for each frame: what only the near frames needed is given back on the way.
+// loaded twice. `frame` plans anew for each frame: what only the near frames needed is given back on the way, and each
+// frame's levels are loaded while the one before is rendered.
 #include <farfield/embree.h>
 #include <farfield/runtime.h>
 
@@ -220,7 +221,11 @@ int main(int argc, char** argv) {
   const PathTracer tracer(scene, *runtime);
   for (size_t frame = 0; frame < cameras.size(); ++frame) {
     const farfield::Stats before = runtime->stats();
-    if (arguments.plans_each_frame) plan_for(*runtime, {cameras[frame]});
+    if (arguments.plans_each_frame) {
+      plan_for(*runtime, {cameras[frame]});
+      // What the next frame needs is loaded while this one is rendered, if the budget has room for both.
+      if (frame + 1 < cameras.size()) runtime->look_ahead({cameras[frame + 1].tessellation()});
+    }
     const Picture picture = render(tracer, cameras[frame]);
     print_frame(frame, picture, before, runtime->stats());
     char name[32];

@@ -48,7 +48,7 @@ void read_into_memory(benchmark::State& state) {
 
 void acquire_ready(benchmark::State& state) {
   ResidentSet set(1000);
-  const size_t item = set.add({1, 0, [](uint64_t) { return LoadedItem{std::make_unique<Resident>(), 1, 0}; }});
+  const size_t item = set.add({1, 0, [](const LoadTerms&) { return LoadedItem{std::make_unique<Resident>(), 1, 0}; }});
   if (set.acquire(item) == nullptr) return state.SkipWithError("the item does not load");
   for (auto _ : state) benchmark::DoNotOptimize(set.acquire(item));
 }

@@ -76,7 +76,7 @@ struct Way {
     seeded.trace.seed = seed;
     Film film(options.width, options.height);
     const double before = process_cpu_seconds();
-    FARFIELD_TRY_LET(last, session->render({&camera, 1}, lights, seeded, film, {}));
+    FARFIELD_TRY_LET(last, session->render({{&camera, 1}, {}}, lights, seeded, film, {}));
     cpu.push_back(process_cpu_seconds() - before);
     return film.image();
   }

@@ -34,6 +34,7 @@ static void plan_and_commit(Host* host, const float eye[3]) {
   CHECK(ff_set_cameras(host->runtime, &camera, 1) == FF_OK);
   CHECK(ff_plan_frame(host->runtime, &plan) == FF_OK);
   CHECK(plan.planned_bytes > 0 && plan.bias == 0.0);
+  CHECK(ff_look_ahead(host->runtime, &camera, 1) == FF_OK);
   CHECK(ff_attach(host->runtime, host->scene, &host->geometry) == FF_OK);
   rtcCommitScene(host->scene);
 }

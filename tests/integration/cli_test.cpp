@@ -566,7 +566,7 @@ TEST_F(WholeRoad, RenderAndShotOfAScene) {
     EXPECT_TRUE(report.contains(key)) << key;
   ASSERT_EQ(report["frames"].size(), 4u);
   for (const Json& frame : report["frames"])
-    for (const char* key : {"frame", "seconds", "load_seconds", "accounted_bytes", "bias"})
+    for (const char* key : {"frame", "seconds", "load_seconds", "stall_seconds", "stall", "accounted_bytes", "bias"})
       EXPECT_TRUE(frame.contains(key)) << key;
   EXPECT_LE(report["peak_accounted_bytes"], report["budget_bytes"]);
   const std::string fingerprint = report["fingerprint"];

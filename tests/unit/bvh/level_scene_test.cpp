@@ -3,6 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <atomic>
+#include <thread>
+#include <vector>
+
 #include "base/parallel.h"
 #include "tests/support/level_builder.h"
 
@@ -44,6 +49,33 @@ TEST(LevelScene, CostIsTheSameWhateverElseIsLoaded) {
   EXPECT_EQ(alone->build_peak_bytes, beside->build_peak_bytes);
 }
 
+TEST(LevelScene, BuildsOfSeveralThreadsAreToldApart) {
+  const std::array soups = {triangle_soup(30000, 0.02f, 2), triangle_soup(5000, 0.02f, 3)};
+  const std::array alone = {measure_level_scene(view_of(soups[0])), measure_level_scene(view_of(soups[1]))};
+  ASSERT_TRUE(alone[0] && alone[1]);
+  auto device = BvhDevice::create();
+  ASSERT_TRUE(device);
+  const uint64_t before = (*device)->bytes();
+  std::vector<std::thread> threads;
+  for (size_t i = 0; i < 4; ++i) {
+    threads.emplace_back([&, i] {
+      for (int repeat = 0; repeat < 5; ++repeat) {
+        const auto cost = measure_level_scene(**device, view_of(soups[i % 2]));
+        ASSERT_TRUE(cost);
+        EXPECT_EQ(cost->resident_bytes, alone[i % 2]->resident_bytes);
+        EXPECT_EQ(cost->build_peak_bytes, alone[i % 2]->build_peak_bytes);
+        // One that may not take so much fails alone.
+        const uint64_t enough = cost->resident_bytes + cost->build_peak_bytes;
+        const auto refused = LevelScene::build(**device, view_of(soups[i % 2]), {enough / 2});
+        ASSERT_FALSE(refused);
+        EXPECT_EQ(refused.error().code, ErrorCode::OutOfBudget);
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ((*device)->bytes(), before);
+}
+
 TEST(LevelScene, ABuildThatWouldTakeMoreThanItMayStopsThereAndIsForgotten) {
   const LevelData soup = triangle_soup(30000, 0.02f, 2), other = triangle_soup(3000, 0.02f, 3);
   const auto device = BvhDevice::create();
@@ -58,18 +90,34 @@ TEST(LevelScene, ABuildThatWouldTakeMoreThanItMayStopsThereAndIsForgotten) {
   const uint64_t enough = free->bytes() + free->build_peak_bytes();
   for (const double share : {0.0, 0.01, 0.3, 0.6, 0.9, 0.99}) {
     const uint64_t held = d.bytes();
-    d.reset_peak();
     const auto most = static_cast<uint64_t>(share * static_cast<double>(enough));
-    const auto scene = LevelScene::build(d, view_of(soup), most);
+    const auto scene = LevelScene::build(d, view_of(soup), {most});
     ASSERT_FALSE(scene) << share;
     EXPECT_EQ(scene.error().code, ErrorCode::OutOfBudget);
-    EXPECT_LE(d.peak_bytes(), held + most) << share;
     EXPECT_EQ(d.bytes(), held) << share;  // nothing is left of it, in Embree's sum or in ours
   }
-  const auto again = LevelScene::build(d, view_of(soup), enough);
+  const auto again = LevelScene::build(d, view_of(soup), {enough});
   ASSERT_TRUE(again) << again.error().message;
   EXPECT_EQ(again->bytes(), free->bytes());
   EXPECT_GT(d.bytes(), before);
+}
+
+TEST(LevelScene, ABuildCanBeCancelledAndIsForgotten) {
+  const LevelData soup = triangle_soup(300000, 0.005f, 2);
+  const auto device = BvhDevice::create();
+  ASSERT_TRUE(device);
+  const auto once = LevelScene::build(**device, view_of(soup));
+  ASSERT_TRUE(once);
+  const uint64_t before = (*device)->bytes();
+  std::atomic<bool> cancel{true};
+  const auto never = LevelScene::build(**device, view_of(soup), {kAnyBytes, &cancel});
+  ASSERT_FALSE(never);
+  EXPECT_EQ(never.error().code, ErrorCode::Cancelled);
+  EXPECT_EQ((*device)->bytes(), before);
+  cancel = false;
+  const auto again = LevelScene::build(**device, view_of(soup), {kAnyBytes, &cancel});
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->bytes(), once->bytes());
 }
 
 TEST(LevelScene, CostDoesNotDependOnTheNumberOfThreads) {

@@ -15,7 +15,7 @@ extern farfield::RayContext context;
 extern std::unique_ptr<farfield::Runtime> runtime;
 extern std::vector<glm::mat4x3> places;
 extern glm::mat4x3 local_to_world;
-extern glm::vec3 eye, throughput, radiance, origin, direction;
+extern glm::vec3 eye, next_eye, throughput, radiance, origin, direction;
 extern farfield::RuntimeOptions options;
 extern unsigned farfield_geometry;
 extern float pixel_spread;

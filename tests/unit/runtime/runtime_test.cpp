@@ -454,6 +454,107 @@ TEST_F(RuntimeTest, PrefetchLoadsWhatCameraRaysNeed) {
   EXPECT_EQ(host.runtime().stats().levels_loaded, loaded);
 }
 
+/// Whether so much is accounted soon.
+bool comes_to_hold(Host& host, uint64_t bytes) {
+  for (int wait = 0; wait < 2000; ++wait) {
+    if (host.runtime().stats().accounted_bytes == bytes) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return false;
+}
+
+TEST_F(RuntimeTest, LevelsLoadedAheadChangeNothingButHowLongRaysWait) {
+  const auto files = copy("ahead.farfield");
+  const vec3 near(0, 0, 5), far(0, 0, 5000);
+  Host plain, ahead;
+  plain.add(sphere());
+  ahead.add(files);
+  const auto loaded = [](Host& host) { return host.runtime().stats().levels_loaded; };
+  plain.plan(near);
+  plain.runtime().prefetch();
+  const uint64_t near_hash = hash_of_hits(plain), near_bytes = plain.runtime().stats().accounted_bytes;
+  plain.plan(far);
+  const uint64_t far_hash = hash_of_hits(plain);
+
+  ahead.plan(far);
+  const uint64_t far_bytes = ahead.runtime().stats().accounted_bytes;
+  ahead.runtime().look_ahead({{near, 0.0f, 1e-3f}});
+  ASSERT_TRUE(comes_to_hold(ahead, near_bytes));
+  EXPECT_EQ(hash_of_hits(ahead), far_hash);
+  EXPECT_EQ(loaded(ahead), 1u);  // the root: nothing else was asked for
+  for (const LevelInfo& level : ahead.runtime().levels({0}))
+    std::filesystem::remove(files / ("level_" + std::to_string(level.level) + ".ffl"));
+  ahead.plan(near);
+  ahead.runtime().prefetch();
+  EXPECT_EQ(hash_of_hits(ahead), near_hash);
+  EXPECT_EQ(ahead.runtime().stats().accounted_bytes, near_bytes);
+  EXPECT_GT(loaded(ahead), 1u);
+  EXPECT_TRUE(ahead.messages.empty()) << ahead.messages[0];
+
+  // A guess that was wrong, and one that is taken back, are dropped by the next plan.
+  plain.runtime().look_ahead({{near, 0.0f, 1e-3f}});
+  ASSERT_TRUE(comes_to_hold(plain, near_bytes));
+  plain.runtime().look_ahead({});
+  EXPECT_EQ(hash_of_hits(plain), far_hash);
+  plain.plan(far);
+  EXPECT_EQ(plain.runtime().stats().accounted_bytes, far_bytes);
+  EXPECT_EQ(hash_of_hits(plain), far_hash);
+}
+
+TEST_F(RuntimeTest, WhatIsBrokenAheadIsSaidByTheFrameThatNeedsIt) {
+  const auto broken = copy("broken_ahead.farfield");
+  const vec3 near(0, 0, 40), far(0, 0, 5000);  // near: levels 0 and 1
+  Host host, sound;
+  host.add(broken);
+  sound.add(sphere());
+  sound.plan(near);
+  sound.runtime().prefetch();
+  const std::vector<LevelRecord> records = sound.runtime().level_stats({0});
+  host.plan(far);
+  const uint64_t far_bytes = host.runtime().stats().accounted_bytes;
+  flip_byte(broken / "level_0.ffl", std::filesystem::file_size(broken / "level_0.ffl") / 2);
+  host.runtime().look_ahead({{near, 0.0f, 1e-3f}});
+  ASSERT_TRUE(comes_to_hold(host, far_bytes + records[1].resident_bytes));  // level 0, the larger, was tried before
+  hash_of_hits(host);
+  EXPECT_EQ(host.plan(near).finest_level[0], 0u);
+  EXPECT_TRUE(host.messages.empty()) << host.messages[0];
+  host.runtime().prefetch();
+  ASSERT_EQ(host.messages.size(), 1u);
+  EXPECT_NE(host.messages[0].find("level_0.ffl"), std::string::npos) << host.messages[0];
+  hash_of_hits(host);
+  host.runtime().look_ahead({{near, 0.0f, 1e-3f}});
+  host.plan(near);
+  hash_of_hits(host);
+  EXPECT_EQ(host.messages.size(), 1u);
+}
+
+TEST_F(RuntimeTest, WhatIsLoadedAheadMakesRoomForInstancesAndAssets) {
+  const auto other = copy("beside.farfield");
+  const vec3 near(0, 0, 5), far(0, 0, 5000);
+  Host probe;
+  probe.add(sphere());
+  const uint64_t budget = probe.plan(near).planned_bytes;
+  probe.runtime().prefetch();
+  const uint64_t near_bytes = probe.runtime().stats().accounted_bytes;
+  Host host(with_budget(budget + 1000));
+  const AssetId asset = host.add(sphere());
+  for (const bool adds_instances : {true, false}) {
+    host.plan(far);
+    host.runtime().look_ahead({{near, 0.0f, 1e-3f}});
+    if (adds_instances) {
+      ASSERT_TRUE(comes_to_hold(host, near_bytes));
+      for (uint64_t i = 0; i < (budget - near_bytes) / 184 + 100; ++i)
+        ASSERT_TRUE(host.runtime().add_instance(asset, mat4x3(1.0f)));
+      EXPECT_LT(host.runtime().stats().accounted_bytes, near_bytes);
+    } else {
+      ASSERT_TRUE(host.runtime().open_asset(other.string()));
+    }
+    hash_of_hits(host);
+  }
+  EXPECT_TRUE(host.messages.empty()) << host.messages[0];
+  EXPECT_LE(host.runtime().stats().peak_accounted_bytes, budget + 1000);
+}
+
 TEST_F(RuntimeTest, OpeningAnotherAssetMakesRoomForItsRoot) {
   const auto other = copy("second.farfield");
   // The budget holds the first sphere whole, or both roots, but not the first sphere and a second root.

@@ -113,7 +113,14 @@ std::unique_ptr<Host> open(const fs::path& folder, Residency residency, Blend bl
   return host;
 }
 
-void fly(Residency residency, Blend blend) {
+/// Where the camera of a frame is.
+vec3 eye_of(int frame) {
+  Rng rng(17, static_cast<uint64_t>(frame));
+  return {9.0f * rng.next() - 1.5f, 0.0f, 3.0f * std::exp2(6.0f * rng.next())};
+}
+
+/// `host` looks ahead; every fifth time at a frame that does not come.
+void fly(Residency residency, Blend blend, bool looks_ahead = false) {
 #ifdef __SANITIZE_THREAD__
   const ThreadLimit no_workers(1);  // TBB and Embree are not instrumented: how their workers wait is not seen
 #endif
@@ -127,7 +134,7 @@ void fly(Residency residency, Blend blend) {
   size_t hits = 0;
   uint64_t most_asked = 0;
   for (int frame = 0; frame < kFrames; ++frame) {
-    const vec3 eye(9.0f * rng.next() - 1.5f, 0.0f, 3.0f * std::exp2(6.0f * rng.next()));
+    const vec3 eye = eye_of(frame);
     most_asked = std::max(most_asked, reference->plan(eye).asked_bytes);
     host->plan(eye);
     std::atomic<bool> is_done{false};
@@ -135,6 +142,7 @@ void fly(Residency residency, Blend blend) {
       Rng own(seed);
       while (!is_done) harm(sound, damaged, own);
     });
+    if (looks_ahead) host->runtime().look_ahead({{eye_of(frame % 5 == 0 ? frame + kFrames : frame + 1), 0.0f, 1e-3f}});
     const std::vector<Seen> seen = look(*host, frame, eye);
     is_done = true;
     vandal.join();
@@ -154,6 +162,11 @@ void fly(Residency residency, Blend blend) {
 TEST(Stress, FilesAreDamagedWhileRaysWaitForThem) { fly(Residency::Wait, Blend::Dissolve); }
 TEST(Stress, FilesAreDamagedWhileRaysGoOnWithout) { fly(Residency::Progressive, Blend::Dissolve); }
 TEST(Stress, FilesAreDamagedWhileLevelsMorph) { fly(Residency::Wait, Blend::Morph); }
+TEST(Stress, FilesAreDamagedWhileLevelsAreLoadedAhead) {
+  fly(Residency::Wait, Blend::Dissolve, true);
+  fly(Residency::Progressive, Blend::Dissolve, true);
+  fly(Residency::Wait, Blend::Morph, true);
+}
 
 }  // namespace
 }  // namespace farfield
