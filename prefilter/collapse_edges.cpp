@@ -48,12 +48,11 @@ class CollapsibleMesh {
   std::vector<FaceMaterial> materials;
   std::vector<uint32_t> merged_into;  ///< per vertex: itself while it lives, else a smaller one
   std::vector<uint8_t> is_face_alive;
-  std::vector<uint8_t>
-      is_flipped;                 ///< per face: wound against its neighbours; meaningless across a Moebius strip's seam
-  std::vector<uint32_t> version;  ///< per vertex: how often it changed
-  std::vector<double> deviation;  ///< per vertex: bound of the distance to the input around it
-  std::vector<uint8_t> is_fixed;  ///< per face: keeps its corners where they are; empty: none does
-  std::vector<uint8_t> is_pinned;  ///< per vertex: stays where it is; empty: none does
+  std::vector<uint8_t> is_flipped;  ///< per face: see flipped_faces()
+  std::vector<uint32_t> version;    ///< per vertex: how often it changed
+  std::vector<double> deviation;    ///< per vertex: bound of the distance to the input around it
+  std::vector<uint8_t> is_fixed;    ///< per face: keeps its corners where they are; empty: none does
+  std::vector<uint8_t> is_pinned;   ///< per vertex: stays where it is; empty: none does
 
   /// Call once the arrays of positions, triangles and materials are filled.
   void build_topology() {
@@ -65,7 +64,7 @@ class CollapsibleMesh {
     stars_ = VertexStars(positions.size(), triangles.size(), [&](uint32_t face, const auto& visit) {
       for (int c = 0; c < 3; ++c) visit(triangles[face][c]);
     });
-    find_winding();
+    is_flipped = flipped_faces(triangles, build_edge_table(triangles, positions.size()));
   }
 
   /// The living faces around a vertex. Valid until the next merge().
@@ -118,39 +117,6 @@ class CollapsibleMesh {
   }
 
  private:
-  /// Lets neighbouring faces agree on a winding, outwards from the first face of each sheet.
-  void find_winding() {
-    const EdgeTable edges = build_edge_table(triangles, positions.size());
-    is_flipped.assign(triangles.size(), 0);
-    std::vector<uint8_t> is_found(triangles.size(), 0);
-    std::vector<uint32_t> front;
-    const auto runs_upwards = [&](uint32_t face, uint32_t edge) {
-      for (int c = 0; c < 3; ++c) {
-        if (edges.face_edges[face][c] == edge) return triangles[face][c] == edges.smaller_vertex[edge];
-      }
-      return false;
-    };
-    for (uint32_t first = 0; first < triangles.size(); ++first) {
-      if (is_found[first]) continue;
-      is_found[first] = 1;
-      front.assign(1, first);
-      while (!front.empty()) {
-        const uint32_t face = front.back();
-        front.pop_back();
-        for (int c = 0; c < 3; ++c) {
-          const uint32_t edge = edges.face_edges[face][c];
-          const auto faces = edges.faces_of(edge);
-          if (faces.size() != 2) continue;
-          const uint32_t neighbour = faces[0] == face ? faces[1] : faces[0];
-          if (is_found[neighbour]) continue;
-          is_found[neighbour] = 1;
-          is_flipped[neighbour] = is_flipped[face] ^ (runs_upwards(face, edge) == runs_upwards(neighbour, edge));
-          front.push_back(neighbour);
-        }
-      }
-    }
-  }
-
   VertexStars stars_;
 };
 

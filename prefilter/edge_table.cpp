@@ -69,4 +69,36 @@ EdgeTable build_edge_table(std::span<const uvec3> triangles, size_t vertex_count
   return table;
 }
 
+bool runs_upwards(std::span<const uvec3> triangles, const EdgeTable& edges, uint32_t face, uint32_t edge) {
+  const uvec3& of_face = edges.face_edges[face];
+  const int corner = of_face.x == edge ? 0 : of_face.y == edge ? 1 : 2;
+  return triangles[face][corner] == edges.smaller_vertex[edge];
+}
+
+std::vector<uint8_t> flipped_faces(std::span<const uvec3> triangles, const EdgeTable& edges) {
+  std::vector<uint8_t> is_flipped(triangles.size(), 0), is_found(triangles.size(), 0);
+  std::vector<uint32_t> front;
+  for (uint32_t first = 0; first < triangles.size(); ++first) {
+    if (is_found[first]) continue;
+    is_found[first] = 1;
+    front.assign(1, first);
+    while (!front.empty()) {
+      const uint32_t face = front.back();
+      front.pop_back();
+      for (int c = 0; c < 3; ++c) {
+        const uint32_t edge = edges.face_edges[face][c];
+        const auto faces = edges.faces_of(edge);
+        if (faces.size() != 2) continue;
+        const uint32_t neighbour = faces[0] == face ? faces[1] : faces[0];
+        if (is_found[neighbour]) continue;
+        is_found[neighbour] = 1;
+        is_flipped[neighbour] = is_flipped[face] ^ (runs_upwards(triangles, edges, face, edge) ==
+                                                    runs_upwards(triangles, edges, neighbour, edge));
+        front.push_back(neighbour);
+      }
+    }
+  }
+  return is_flipped;
+}
+
 }  // namespace farfield

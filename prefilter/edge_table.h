@@ -27,4 +27,11 @@ struct EdgeTable {
 /// Builds the table in time linear in the number of faces (for bounded valence). Indices must be < vertex_count.
 EdgeTable build_edge_table(std::span<const uvec3> triangles, size_t vertex_count);
 
+/// Whether the face, which has the edge, runs from its smaller to its larger vertex.
+bool runs_upwards(std::span<const uvec3> triangles, const EdgeTable& edges, uint32_t face, uint32_t edge);
+
+/// Per face: whether it is wound against its neighbours, outwards from the first face of each sheet through edges of
+/// two faces; meaningless across a Moebius strip's seam.
+std::vector<uint8_t> flipped_faces(std::span<const uvec3> triangles, const EdgeTable& edges);
+
 }  // namespace farfield

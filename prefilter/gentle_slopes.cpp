@@ -31,17 +31,13 @@ struct Slope {
 class Sides {
  public:
   Sides(const Surface& surface, const EdgeTable& edges)
-      : surface_(surface), edges_(edges), is_reached_(surface.triangles.size()), is_turned_(surface.triangles.size()) {
-    for (uint32_t face = 0; face < is_reached_.size(); ++face) {
-      if (!std::exchange(is_reached_[face], 1)) spread_from(face);
-    }
-  }
+      : surface_(surface), edges_(edges), is_flipped_(flipped_faces(surface.triangles, edges)) {}
 
   /// Area vector, twice as long as the area is large.
   dvec3 normal(uint32_t face) const {
     const dvec3 a = corner_position(surface_, face, 0);
     const dvec3 normal = glm::cross(corner_position(surface_, face, 1) - a, corner_position(surface_, face, 2) - a);
-    return is_turned_[face] ? -normal : normal;
+    return is_flipped_[face] ? -normal : normal;
   }
 
   /// Whether two faces meet at the edge, and have the same side there.
@@ -51,34 +47,14 @@ class Sides {
   }
 
  private:
-  void spread_from(uint32_t first) {
-    front_.assign(1, first);
-    while (!front_.empty()) {
-      const uint32_t face = front_.back();
-      front_.pop_back();
-      for (int c = 0; c < 3; ++c) {
-        const uint32_t edge = edges_.face_edges[face][c];
-        const auto faces = edges_.faces_of(edge);
-        if (faces.size() != 2) continue;
-        const uint32_t other = faces[0] == face ? faces[1] : faces[0];
-        if (std::exchange(is_reached_[other], 1)) continue;
-        is_turned_[other] = runs_forward(face, edge) == runs_forward(other, edge);
-        front_.push_back(other);
-      }
-    }
-  }
-
   /// From the edge's smaller vertex to its larger one, on the face's side.
   bool runs_forward(uint32_t face, uint32_t edge) const {
-    const uvec3& of_face = edges_.face_edges[face];
-    const int corner = of_face.x == edge ? 0 : of_face.y == edge ? 1 : 2;
-    return (surface_.triangles[face][corner] == edges_.smaller_vertex[edge]) != (is_turned_[face] != 0);
+    return runs_upwards(surface_.triangles, edges_, face, edge) != (is_flipped_[face] != 0);
   }
 
   const Surface& surface_;
   const EdgeTable& edges_;
-  std::vector<uint8_t> is_reached_, is_turned_;
-  std::vector<uint32_t> front_;
+  const std::vector<uint8_t> is_flipped_;
 };
 
 std::vector<Slope> block_slopes(const Surface& surface, const EdgeTable& edges, const Blocks& blocks) {
