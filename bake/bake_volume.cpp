@@ -9,7 +9,7 @@
 
 #include "bake/level_writer.h"
 #include "bake/pack_fog.h"
-#include "bake/stopwatch.h"
+#include "base/stopwatch.h"
 #include "scattering/fog_phase.h"
 
 namespace farfield {

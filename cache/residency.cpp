@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <exception>
 #include <limits>
 #include <utility>
@@ -13,6 +12,7 @@
 #include "base/bytes.h"
 #include "base/check.h"
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 
 namespace farfield {
 
@@ -43,14 +43,6 @@ Result<LoadedItem> run_load(const ResidencyItem& item, const LoadTerms& terms) {
 bool has_failed(ItemState state) { return state == ItemState::Refused || state == ItemState::Broken; }
 
 uint64_t while_loading(const ResidencyItem& item) { return saturating_add(item.resident_bytes, item.build_peak_bytes); }
-
-class Stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 }  // namespace
 

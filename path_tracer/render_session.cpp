@@ -5,13 +5,13 @@
 #include <malloc.h>
 
 #include <algorithm>
-#include <chrono>
 
 #include "base/bytes.h"
 #include "base/parallel.h"
 #include "base/process_memory.h"
 #include "base/process_time.h"
 #include "base/result.h"
+#include "base/stopwatch.h"
 #include "path_tracer/pixel_look.h"
 
 namespace farfield {
@@ -47,10 +47,6 @@ std::vector<TessellationCamera> tessellation(std::span<const Camera> camera, con
     keys.back().off_screen_scale = options.off_screen_scale;
   }
   return keys;
-}
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 // The runtime knows what the assets and instances need that it was given so far; here all are known.
@@ -171,14 +167,14 @@ Result<void> RenderSession::explain(const Camera& camera, const RenderOptions& o
 
 Result<FrameReport> RenderSession::render(const FrameCameras& cameras, const Lights& lights,
                                           const RenderOptions& options, Film& film, const Job& job) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const double cpu_start = process_cpu_seconds();
   const Stats before = runtime_->stats();
   const std::vector<std::vector<LevelRecord>> levels_before = level_stats();
   FARFIELD_TRY_LET(auto plan, this->plan(cameras.now, options));
-  const auto prefetch_start = std::chrono::steady_clock::now();
+  const Stopwatch prefetch_watch;
   runtime_->prefetch();
-  const double prefetch_seconds = seconds_since(prefetch_start);
+  const double prefetch_seconds = prefetch_watch.seconds();
   const double waited_before = runtime_->stats().wait_seconds;
   malloc_trim(0);  // nor is what moving and planning left there
   runtime_->look_ahead(tessellation(cameras.next, options));
@@ -188,7 +184,7 @@ Result<FrameReport> RenderSession::render(const FrameCameras& cameras, const Lig
 
   const Stats after = runtime_->stats();
   FrameReport report;
-  report.seconds = seconds_since(start);
+  report.seconds = watch.seconds();
   report.cpu_seconds = process_cpu_seconds() - cpu_start;
   report.load_seconds = after.load_seconds - before.load_seconds;
   report.stall_seconds = prefetch_seconds + (after.wait_seconds - waited_before) / thread_count();

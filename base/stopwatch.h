@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long the steps of a bake take, for its report.
 #pragma once
 
 #include <chrono>
 
 namespace farfield {
 
-/// Seconds since it was made.
+/// Wall seconds since it was made. Any thread.
 class Stopwatch {
  public:
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
