@@ -73,7 +73,7 @@ Result<std::unique_ptr<BvhDevice>> BvhDevice::create() {
 }
 
 Result<MeasuredScene> build_measured_scene(BvhDevice& device, const std::function<std::vector<EmbreeGeometry>()>& make,
-                                           const BuildTerms& terms, std::string_view what) {
+                                           const LoadTerms& terms, std::string_view what) {
   forget_embree_error(device.handle());  // not ours
 
   BuildMeter meter(terms.most_bytes);

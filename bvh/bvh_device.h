@@ -5,13 +5,13 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <string_view>
 #include <vector>
 
 #include "base/embree.h"
 #include "base/result.h"
+#include "cache/load_terms.h"
 
 namespace farfield {
 
@@ -37,17 +37,6 @@ class BvhDevice {
   EmbreeDevice device_;            // last, so released first: what it gives back is still counted
 };
 
-/// As much memory as there is.
-inline constexpr uint64_t kAnyBytes = std::numeric_limits<uint64_t>::max();
-
-/// What a build may do.
-struct BuildTerms {
-  uint64_t most_bytes = kAnyBytes;            ///< that Embree gets, at the worst moment
-  const std::atomic<bool>* cancel = nullptr;  ///< polled meanwhile; once true, the build fails with Cancelled
-
-  bool is_cancelled() const { return cancel && cancel->load(std::memory_order_relaxed); }  // relaxed: it guards nothing
-};
-
 /// What Embree does not report: scene objects, geometry objects and malloc's rounding, measured on 3.13.5.
 inline constexpr uint64_t kSceneOverheadBytes = 3072;
 inline constexpr uint64_t kGeometryOverheadBytes = 300;
@@ -64,6 +53,6 @@ struct MeasuredScene {
 /// for messages, "the BVH of 8 quads". Errors: OutOfBudget (most_bytes are not enough), Cancelled, Io (out of memory,
 /// or what else Embree says).
 Result<MeasuredScene> build_measured_scene(BvhDevice& device, const std::function<std::vector<EmbreeGeometry>()>& make,
-                                           const BuildTerms& terms, std::string_view what);
+                                           const LoadTerms& terms, std::string_view what);
 
 }  // namespace farfield

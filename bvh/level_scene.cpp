@@ -12,7 +12,7 @@
 
 namespace farfield {
 
-Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, const BuildTerms& terms,
+Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, const LoadTerms& terms,
                                      EmbreeFilter filter, void* user) {
   LevelScene result;
   if (!level.has_surface()) return result;

@@ -20,7 +20,7 @@ class LevelScene {
   /// reads them. Four bytes after the last position must be readable (level files see to that), because Embree loads
   /// vertices 16 bytes at a time. `filter`, if there is one, is asked about every hit, with `user`. terms, errors:
   /// those of build_measured_scene().
-  static Result<LevelScene> build(BvhDevice& device, const LevelView& level, const BuildTerms& terms = {},
+  static Result<LevelScene> build(BvhDevice& device, const LevelView& level, const LoadTerms& terms = {},
                                   EmbreeFilter filter = nullptr, void* user = nullptr);
 
   EmbreeSceneRef handle() const { return built_.scene.get(); }  ///< null without a surface

@@ -6,7 +6,7 @@
 namespace farfield {
 
 Result<std::unique_ptr<TracedLevel>> TracedLevel::build(BvhDevice& device, const LevelView& level, uint32_t slot,
-                                                        const SurfaceLook* look, const BuildTerms& terms) {
+                                                        const SurfaceLook* look, const LoadTerms& terms) {
   std::unique_ptr<TracedLevel> traced(new TracedLevel);
   traced->view = level;
   traced->volume = BrickVolume(level);

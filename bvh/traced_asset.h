@@ -44,7 +44,7 @@ struct TracedLevel {
 
   /// Builds the BVH, within terms. Errors: those of LevelScene::build.
   static Result<std::unique_ptr<TracedLevel>> build(BvhDevice& device, const LevelView& level, uint32_t slot,
-                                                    const SurfaceLook* look = nullptr, const BuildTerms& terms = {});
+                                                    const SurfaceLook* look = nullptr, const LoadTerms& terms = {});
   TracedLevel(const TracedLevel&) = delete;
   TracedLevel& operator=(const TracedLevel&) = delete;
 

@@ -35,6 +35,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "cache/load_terms.h"
 
 namespace farfield {
 
@@ -48,14 +49,6 @@ struct LoadedItem {
   std::unique_ptr<Resident> object;  ///< not null
   uint64_t resident_bytes = 0;       ///< that stay until release
   uint64_t build_peak_bytes = 0;     ///< further ones at the worst moment of the load
-};
-
-/// What a load may do.
-struct LoadTerms {
-  uint64_t most_bytes = 0;                    ///< more it must not take even for a moment, but fail with OutOfBudget
-  const std::atomic<bool>* cancel = nullptr;  ///< where it is not null: once true, the load had better end, Cancelled
-
-  bool is_cancelled() const { return cancel && cancel->load(std::memory_order_relaxed); }  // relaxed: it guards nothing
 };
 
 /// What an item will take, as far as is known before it is loaded, and how to load it.
