@@ -21,6 +21,7 @@
 #include "bake/level_writer.h"
 #include "bake/pack_level.h"
 #include "bake/pack_source.h"
+#include "bake/take_parts_out.h"
 #include "bake/volume_job.h"
 #include "base/big_vector.h"
 #include "base/file_io.h"
@@ -61,6 +62,11 @@ Result<void> check_options(const BakeOptions& options) {
   return check_options(options.import.subdivision);
 }
 
+/// One mesh of a file stands in one place, and of tiles cuts matter.
+bool may_have_parts(const BakeOptions& options) {
+  return options.import.mesh < 0 && !options.import.tile.is_part();
+}
+
 /// Equal text and source hash give equal bytes.
 std::string canonical_options(const BakeOptions& options, bool is_volume) {
   if (is_volume) {
@@ -73,7 +79,8 @@ std::string canonical_options(const BakeOptions& options, bool is_volume) {
   const MeshTile& part = options.import.tile;
   const std::string tile =
       part.is_part() ? fmt::format("tile={}/{} tiles={} ", part.number, part.count, kTilesVersion) : "";
-  const std::string import = fmt::format("mesh={} {}{}{}condition={}", options.import.mesh, node, tile,
+  const std::string parts = may_have_parts(options) ? "parts=1 " : "";
+  const std::string import = fmt::format("mesh={} {}{}{}{}condition={}", options.import.mesh, node, tile, parts,
                                          canonical_text(import_options(options).subdivision), kConditionVersion);
   if (options.source_only) return "source_only=1 " + import;
   constexpr int kMorphVersion = 1;  // of what the manifest has of morphs
@@ -130,6 +137,18 @@ void compose(std::vector<uint32_t>& first, const std::vector<uint32_t>& then) {
   for (uint32_t& i : first) {
     if (i != kMorphVoxelized && i != kMorphCollapsed) i = then[i];
   }
+}
+
+/// Where parts begin in a level. part: of each triangle, as PartedSource has it.
+std::vector<uint32_t> first_quads_of_parts(const std::vector<uint32_t>& part, const SurfaceOrder& order,
+                                           const LevelData& level) {
+  std::vector<uint32_t> part_of_face(part.size());
+  for (size_t t = 0; t < part.size(); ++t) part_of_face[order.face_number[t]] = part[t];
+  std::vector<uint32_t> first(part.back(), 0);
+  for (uint32_t quad = static_cast<uint32_t>(level.quads.size()); quad-- > 0;) {
+    if (const uint32_t p = part_of_face[level.quad_first_face[quad]]; p > 0) first[p - 1] = quad;
+  }
+  return first;
 }
 
 /// A surface in two parts. Of `macrosurface` all vertices are kept, so that their numbers stay.
@@ -253,17 +272,40 @@ class Baker {
     report_.manifest.textures = look_.textures;
     report_.manifest.materials = look_.materials;
 
-    const Surface faces = average_faces(source_, options_.job);
-    if (options_.job.is_cancelled()) return cancelled();
-    source_order_ = order_surface(faces);
-    const Surface ordered = reorder(faces, source_order_);
-    LevelData level = pack_level(0, report_.manifest.base_resolution, ordered, source_order_, {}, {});
-    free_memory(level.face_sggx);  // hits have the normals themselves
-    pack_source(source_, source_order_, ordered, level);
+    std::optional<PartedSource> parted;
+    if (may_have_parts(options_)) parted = take_parts_out(source_);
+    has_parts_ = parted.has_value();
+    FARFIELD_TRY_LET(LevelData level, parted ? pack_parts(*parted) : pack_whole());
     auto done = store_level(level, level_report);
     level_report.write_seconds = watch.seconds();
     report_.levels.push_back(level_report);
     return done;
+  }
+
+  Result<LevelData> pack_whole() {
+    const Surface faces = average_faces(source_, options_.job);
+    if (options_.job.is_cancelled()) return cancelled();
+    source_order_ = order_surface(faces);
+    return pack_level_0(source_, faces, source_order_);
+  }
+
+  Result<LevelData> pack_parts(const PartedSource& parted) {
+    const Surface faces = average_faces(parted.surface, options_.job);
+    if (options_.job.is_cancelled()) return cancelled();
+    const SurfaceOrder order = order_surface(faces, parted.part);
+    LevelData level = pack_level_0(parted.surface, faces, order);
+    level.header.bounds = source_.bounds();
+    level.placements = parted.places;
+    level.part_first_quad = first_quads_of_parts(parted.part, order, level);
+    return level;
+  }
+
+  LevelData pack_level_0(const SourceSurface& source, const Surface& faces, const SurfaceOrder& order) const {
+    const Surface ordered = reorder(faces, order);
+    LevelData level = pack_level(0, report_.manifest.base_resolution, ordered, order, {}, {});
+    free_memory(level.face_sggx);  // hits have the normals themselves
+    pack_source(source, order, ordered, level);
+    return level;
   }
 
   Result<void> bake_level(uint32_t level, double resolution) {
@@ -323,18 +365,23 @@ class Baker {
     }
     cut_points_ = CutPoints(source_, *resolved);
     surface_ = std::move(resolved->surface);
-    // From the final numbers of level 0; what is not there any more fades out.
-    static_assert(kNoIndex == kMorphVoxelized);
-    from_stored_ = identity_maps(source_.positions.size(), source_.triangles.size());
-    for (size_t v = 0; v < source_.positions.size(); ++v) {
-      from_stored_.vertex[source_order_.vertex_number[v]] = resolved->vertex_of[v];
-    }
-    for (size_t f = 0; f < source_.triangles.size(); ++f) {
-      from_stored_.face[source_order_.face_number[f]] = resolved->face_of[f];
-    }
+    map_from_source(*resolved);
     is_resolved_ = true;
     source_ = {};
     return {};
+  }
+
+  /// From the final numbers of level 0; what is not there any more fades out. None from parts, which stand for many.
+  void map_from_source(const ResolvedSurface& resolved) {
+    static_assert(kNoIndex == kMorphVoxelized);
+    if (has_parts_) return;
+    from_stored_ = identity_maps(source_.positions.size(), source_.triangles.size());
+    for (size_t v = 0; v < source_.positions.size(); ++v) {
+      from_stored_.vertex[source_order_.vertex_number[v]] = resolved.vertex_of[v];
+    }
+    for (size_t f = 0; f < source_.triangles.size(); ++f) {
+      from_stored_.face[source_order_.face_number[f]] = resolved.face_of[f];
+    }
   }
 
   /// Steps A and S: what is no longer surface at this resolution leaves surface_, the rest is simplified.
@@ -546,7 +593,8 @@ class Baker {
   BakeReport report_;
   LevelWriter writer_;         ///< into report_.manifest
   SourceSurface source_;       ///< until it is resolved
-  SurfaceOrder source_order_;  ///< of level 0
+  SurfaceOrder source_order_;  ///< of level 0, unless it has parts
+  bool has_parts_ = false;     ///< level 0
   AssetLook look_;
   std::vector<double> texel_areas_;
   bool is_resolved_ = false;       ///< from then on surface_ is there

@@ -12,13 +12,14 @@
 #include "bvh/ray_cost.h"
 #include "bvh/traced_morph.h"
 #include "cache/level_file.h"
+#include "cache/placed_parts.h"
 
 namespace farfield {
 namespace {
 
 /// All vertices and stored voxels of a level.
 void add_to_hull(const LevelView& level, SlabHull& hull) {
-  for (const vec3& position : level.positions) hull.add(position);
+  for_each_surface_point(level, [&](const vec3& point) { hull.add(point); });
   const float voxel_size = level.header.resolution;
   for_each_brick(level, [&](const Brick& brick, const ivec3& coordinates) {
     const Box3 voxels = active_box(brick);
@@ -47,7 +48,7 @@ Result<bool> LevelWriter::write(const LevelView& level, uint32_t grid, uint64_t 
   entry.bricks = level.bricks.size();
   entry.resident_bytes = cost.resident_bytes;
   entry.build_peak_bytes = cost.build_peak_bytes;
-  entry.ray_cost = ray_cost(level);
+  entry.ray_cost = level.has_parts() ? ray_cost(view_of(flattened(level))) : ray_cost(level);
   const std::filesystem::path path = folder_ / entry.file;
   FARFIELD_TRY_LET(entry.file_bytes, write_level(path, level));
   FARFIELD_TRY_LET(entry.file_hash, hash_file(path));
@@ -59,9 +60,11 @@ Result<bool> LevelWriter::write(const LevelView& level, uint32_t grid, uint64_t 
   return true;
 }
 
-Result<LevelCost> LevelWriter::measure_morph_to(const LevelView& level) const {
+Result<std::optional<LevelCost>> LevelWriter::measure_morph_to(const LevelView& level) const {
   FARFIELD_TRY_LET(const auto finer, LevelFile::open(folder_ / manifest_.levels.back().file, LevelCheck::Structure));
-  return measure_morph(finer->view(), level);
+  if (finer->view().has_parts()) return std::nullopt;  // rays see one of the two
+  FARFIELD_TRY_LET(const LevelCost cost, measure_morph(finer->view(), level));
+  return cost;
 }
 
 Result<void> LevelWriter::finish() {

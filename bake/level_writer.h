@@ -29,7 +29,7 @@ class LevelWriter {
 
  private:
   /// What the morph from the last level that was written to this one takes.
-  Result<LevelCost> measure_morph_to(const LevelView& level) const;
+  Result<std::optional<LevelCost>> measure_morph_to(const LevelView& level) const;
 
   std::filesystem::path folder_;
   MeasureLevel measure_;

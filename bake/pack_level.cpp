@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <optional>
+#include <tuple>
 #include <type_traits>
 
 #include "bake/pack_arrays.h"
@@ -175,21 +177,28 @@ uint64_t morton_code(const vec3& point, const Box3& box) {
   return spread_bits(cell.x) | spread_bits(cell.y) << 1 | spread_bits(cell.z) << 2;
 }
 
-void sort_along_curve(const Surface& surface, std::vector<Pair>& pairs) {
-  const Box3 box = surface.bounds();
-  std::vector<std::pair<uint64_t, uint32_t>> keys(pairs.size());
+/// part: of a triangle.
+template <typename Part>
+void sort_along_curve(const Surface& surface, const Part& part, std::vector<Pair>& pairs) {
+  std::map<uint32_t, Box3> boxes;  // of parts
+  for (uint32_t face = 0; face < surface.triangles.size(); ++face) {
+    Box3& box = boxes[part(face)];
+    for (int c = 0; c < 3; ++c) box.extend(surface.positions[surface.triangles[face][c]]);
+  }
+  std::vector<std::tuple<uint32_t, uint64_t, uint32_t>> keys(pairs.size());
   for (uint32_t i = 0; i < pairs.size(); ++i) {
     Box3 bounds;
     for (const uint32_t face : {pairs[i].face0, pairs[i].face1}) {
       if (face == kNoIndex) continue;
       for (int c = 0; c < 3; ++c) bounds.extend(surface.positions[surface.triangles[face][c]]);
     }
-    keys[i] = {morton_code(bounds.center(), box), i};
+    const uint32_t of_part = part(pairs[i].face0);
+    keys[i] = {of_part, morton_code(bounds.center(), boxes[of_part]), i};
   }
   std::sort(keys.begin(), keys.end());
   std::vector<Pair> sorted;
   sorted.reserve(pairs.size());
-  for (const auto& key : keys) sorted.push_back(pairs[key.second]);
+  for (const auto& key : keys) sorted.push_back(pairs[std::get<2>(key)]);
   pairs = std::move(sorted);
 }
 
@@ -290,9 +299,9 @@ Box3 stored_bounds(const SparseVolume& volume, const VoxelBrick& brick) {
 
 }  // namespace
 
-SurfaceOrder order_surface(const Surface& surface) {
+SurfaceOrder order_surface(const Surface& surface, std::span<const uint32_t> part) {
   std::vector<Pair> pairs = Pairing(surface).run();
-  sort_along_curve(surface, pairs);
+  sort_along_curve(surface, [&](uint32_t face) { return part.empty() ? 0 : part[face]; }, pairs);
 
   SurfaceOrder order;
   order.quads.reserve(pairs.size());

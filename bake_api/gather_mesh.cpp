@@ -320,8 +320,10 @@ Result<void> append_all(const BakeInput& input, const Job& job, SourceMesh& out)
   has.scale =
       std::ranges::any_of(instances, [](const BakeInstance& instance) { return scale_of(instance.to_asset) != 1; });
   for (const BakeInstance& instance : instances) {
+    const size_t first_face = out.face_count();
     append(input.meshes[instance.mesh], instance.to_asset, has, job, out);
     if (job.is_cancelled()) return cancelled();
+    out.placements.push_back({instance.mesh, first_face, out.face_count() - first_face, instance.to_asset});
   }
   return {};
 }

@@ -47,15 +47,15 @@ Result<void> check_embree(EmbreeDeviceRef device, std::string_view task) {
 }
 
 EmbreeScene build_static_scene(EmbreeDeviceRef device, std::span<const EmbreeGeometry> geometries,
-                               const std::atomic<bool>* cancel) {
+                               const std::atomic<bool>* cancel, unsigned first_id) {
   EmbreeScene scene = new_scene(device);
   rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_MEDIUM);
-  for (unsigned id = 0; id < geometries.size(); ++id) {
-    const EmbreeGeometryRef geometry = geometries[id].get();
+  for (unsigned i = 0; i < geometries.size(); ++i) {
+    const EmbreeGeometryRef geometry = geometries[i].get();
     if (!geometry) continue;
     rtcSetGeometryMask(geometry, 0xffffffffu);
     rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(scene.get(), geometry, id);
+    rtcAttachGeometryByID(scene.get(), geometry, first_id + i);
   }
   if (cancel) {
     const auto may_go_on = [](void* flag, double) {

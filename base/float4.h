@@ -28,4 +28,10 @@ inline Float4 abs4(const Float4& v) { return max4(v, -v); }
 /// xyz of one, w of the other.
 inline Float4 with_w_of(const Float4& xyz, const Float4& w) { return __builtin_shufflevector(xyz, w, 0, 1, 2, 7); }
 
+/// The first three lanes by a matrix behind which four bytes can be read; the fourth lane is anything.
+inline Float4 transform_vector(const mat4x3& m, const Float4& v) {
+  return load4(&m[0].x) * v[0] + load4(&m[1].x) * v[1] + load4(&m[2].x) * v[2];
+}
+inline Float4 transform_point(const mat4x3& m, const Float4& p) { return transform_vector(m, p) + load4(&m[3].x); }
+
 }  // namespace farfield

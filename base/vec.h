@@ -21,6 +21,9 @@ using glm::vec4;
 inline constexpr float kPi = 3.14159265358979323846f;
 inline constexpr float kInvPi = 0.31830988618379067154f;
 
+/// The largest coordinate that Embree takes.
+inline constexpr float kEmbreeLargest = 1.8e18f;
+
 /// Axis-aligned box. Default constructed it is empty: lower > upper, and extending it by a point gives that point.
 struct Box3 {
   vec3 lower{std::numeric_limits<float>::infinity()};

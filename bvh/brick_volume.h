@@ -54,9 +54,6 @@ inline RayRange clip_to_box(const LocalRay& ray, const Box3& box) {
   return clip_to_box(load_xyz(ray.origin), load_xyz(ray.direction), ray.t_near, ray.t_far, box);
 }
 
-/// The largest coordinate that Embree takes.
-inline constexpr float kEmbreeLargest = 1.8e18f;
-
 /// No NaN, no infinity, and nothing beyond what Embree takes. Zero directions are traceable. The same lanes count.
 inline bool is_traceable(const Float4& origin, const Float4& direction) {
   const Float4 size = abs4(origin) + abs4(direction);

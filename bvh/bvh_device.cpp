@@ -73,13 +73,13 @@ Result<std::unique_ptr<BvhDevice>> BvhDevice::create() {
 }
 
 Result<MeasuredScene> build_measured_scene(BvhDevice& device, const std::function<std::vector<EmbreeGeometry>()>& make,
-                                           const LoadTerms& terms, std::string_view what) {
+                                           const LoadTerms& terms, std::string_view what, unsigned first_id) {
   forget_embree_error(device.handle());  // not ours
 
   BuildMeter meter(terms.most_bytes);
   MeasuredScene result;
   const std::vector<EmbreeGeometry> geometries = make();
-  result.scene = build_static_scene(device.handle(), geometries, terms.cancel);
+  result.scene = build_static_scene(device.handle(), geometries, terms.cancel, first_id);
   const auto count = static_cast<uint64_t>(
       std::ranges::count_if(geometries, [](const EmbreeGeometry& geometry) { return geometry != nullptr; }));
   const uint64_t overheads = kSceneOverheadBytes + count * kGeometryOverheadBytes;  // what it does not report is small

@@ -53,6 +53,6 @@ struct MeasuredScene {
 /// for messages, "the BVH of 8 quads". Errors: OutOfBudget (most_bytes are not enough), Cancelled, Io (out of memory,
 /// or what else Embree says).
 Result<MeasuredScene> build_measured_scene(BvhDevice& device, const std::function<std::vector<EmbreeGeometry>()>& make,
-                                           const LoadTerms& terms, std::string_view what);
+                                           const LoadTerms& terms, std::string_view what, unsigned first_id = 0);
 
 }  // namespace farfield

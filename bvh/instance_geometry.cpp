@@ -21,9 +21,9 @@
 #include <numeric>
 
 #include "base/check.h"
-#include "base/float4.h"
 #include "base/hash.h"
 #include "base/just_behind.h"
+#include "bvh/ray_lanes.h"
 #include "bvh/traced_morph.h"
 
 namespace farfield {
@@ -34,34 +34,8 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // How much the range in which a ray meets an instance's local bounds is widened: rounding of the slab test.
 constexpr float kRangePad = 1e-6f;
 
-/// A ray in the lanes that Embree has it in: w is tnear and time.
-struct RayLanes {
-  Float4 origin;
-  Float4 direction;
-
-  static RayLanes of(const EmbreeRay& ray) { return {load4(&ray.org_x), load4(&ray.dir_x)}; }
-  void store_to(EmbreeRay& ray) const { store4(&ray.org_x, origin), store4(&ray.dir_x, direction); }
-};
-static_assert(offsetof(EmbreeRay, tnear) == 3 * sizeof(float) && offsetof(EmbreeRay, dir_x) == 4 * sizeof(float) &&
-              offsetof(EmbreeRay, time) == 7 * sizeof(float));
-
-/// Puts a ray into local space, and back at the end of the scope.
-class InLocalSpace {
- public:
-  InLocalSpace(EmbreeRay& ray, const RayLanes& local) : ray_(ray), world_(RayLanes::of(ray)) { local.store_to(ray); }
-  ~InLocalSpace() { world_.store_to(ray_); }
-  InLocalSpace(const InLocalSpace&) = delete;
-  InLocalSpace& operator=(const InLocalSpace&) = delete;
-
- private:
-  EmbreeRay& ray_;
-  RayLanes world_;
-};
-
 RayLanes to_local(const InstanceRecord& record, const EmbreeRay& ray) {
-  const RayLanes world = RayLanes::of(ray);
-  return {with_w_of(record.point_to_local(world.origin), world.origin),
-          with_w_of(record.vector_to_local(world.direction), world.direction)};
+  return RayLanes::of(ray).transformed(record.world_to_local);
 }
 
 /// Random bits of a ray in an instance.
@@ -123,7 +97,7 @@ bool InstanceGeometry::intersect_level(const Visit& visit, uint64_t ray_bits, Em
   RTCHit& hit = ray_hit.hit;
   bool on_surface = false;
   if (level.scene.handle()) {
-    const InLocalSpace scope(ray_hit.ray, visit.ray);
+    const InSpace scope(ray_hit.ray, visit.ray);
     on_surface = trace_nearest(level.scene.handle(), embree_context, ray_hit);
   }
   if (!level.volume.is_empty()) {
@@ -141,7 +115,11 @@ bool InstanceGeometry::intersect_level(const Visit& visit, uint64_t ray_bits, Em
   if (!on_surface) return false;
   made = {};
   made.level_slot = static_cast<uint8_t>(level.slot);
-  made.element = 2 * hit.primID + quad_side(hit.u, hit.v);
+  made.element = 2 * level.view.quad_of(hit.geomID, hit.primID) + quad_side(hit.u, hit.v);
+  if (hit.geomID != 0) {
+    made.placement = hit.instID[0];
+    hit.instID[0] = embree_context.instID[0];
+  }
   const vec2 barycentric = face_barycentric(hit.u, hit.v);
   made.barycentric[0] = barycentric.x, made.barycentric[1] = barycentric.y;
   return true;
@@ -150,7 +128,7 @@ bool InstanceGeometry::intersect_level(const Visit& visit, uint64_t ray_bits, Em
 /// The same on a morph.
 bool InstanceGeometry::intersect_morph(const Visit& visit, uint64_t ray_bits, EmbreeRayHit& ray_hit,
                                        EmbreeContext& embree_context, HitRecord& made) {
-  const InLocalSpace scope(ray_hit.ray, visit.ray);
+  const InSpace scope(ray_hit.ray, visit.ray);
   const auto found = visit.morph->intersect(ray_hit, embree_context, visit.choice.blend, ray_bits);
   if (!found) return false;
   made = {};
@@ -192,7 +170,9 @@ bool InstanceGeometry::intersect(uint32_t instance, unsigned geometry_id, Embree
   } else {
     const vec3 normal(hit.Ng_x, hit.Ng_y, hit.Ng_z);
     made.normal_local[0] = normal.x, made.normal_local[1] = normal.y, made.normal_local[2] = normal.z;
-    normal_world = hit_instance.normal_to_world(normal);
+    normal_world = made.placement == kNoPlacement
+                       ? hit_instance.normal_to_world(normal)
+                       : placed(hit_instance, visit.level->view.placements[made.placement]).normal_to_world(normal);
   }
   made.footprint = context.width_at(ray.tfar);
   hit.Ng_x = normal_world.x, hit.Ng_y = normal_world.y, hit.Ng_z = normal_world.z;
@@ -208,12 +188,12 @@ bool InstanceGeometry::occluded(uint32_t instance, EmbreeRay& ray, RayContext& c
   if (!enter(record_at(instance, ray.time, moved), instance, ray, context, visit)) return false;
   float* const transmittance = context.transmittance >= 0.0f ? &context.transmittance : nullptr;
   if (visit.morph) {
-    const InLocalSpace scope(ray, visit.ray);
+    const InSpace scope(ray, visit.ray);
     return visit.morph->occluded(ray, *embree_context, visit.choice.blend, bits_of_ray(context, instance),
                                  transmittance);
   }
   if (visit.level->scene.handle()) {
-    const InLocalSpace scope(ray, visit.ray);
+    const InSpace scope(ray, visit.ray);
     if (trace_occlusion(visit.level->scene.handle(), *embree_context, ray)) return true;
   }
   const BrickVolume& volume = visit.level->volume;

@@ -56,6 +56,14 @@ Result<InstanceRecord> make_instance(uint32_t asset, const mat4x3& local_to_worl
   return record;
 }
 
+InstanceRecord placed(const InstanceRecord& instance, const Placement& placement) {
+  const glm::dmat3 outer = linear_part(instance.world_to_local), inner = linear_part(placement.level_to_part);
+  InstanceRecord result = instance;
+  result.set_inverse(inner * outer, inner * glm::dvec3(instance.world_to_local[3]) +
+                                        glm::dvec3(placement.level_to_part[3]));
+  return result;
+}
+
 float largest_stretch(const mat4x3& local_to_world) {
   // The largest eigenvalue of A^T A by its trigonometric closed form [Smith 1961].
   const glm::dmat3 a = linear_part(local_to_world);

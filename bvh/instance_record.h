@@ -26,22 +26,21 @@ struct alignas(64) InstanceRecord {
     return world_to_local[0] * v.x + world_to_local[1] * v.y + world_to_local[2] * v.z;
   }
   /// The same of the first three lanes; the fourth is anything.
-  Float4 point_to_local(const Float4& p) const { return vector_to_local(p) + column(3); }
-  Float4 vector_to_local(const Float4& v) const { return column(0) * v[0] + column(1) * v[1] + column(2) * v[2]; }
+  Float4 point_to_local(const Float4& p) const { return transform_point(world_to_local, p); }
+  Float4 vector_to_local(const Float4& v) const { return transform_vector(world_to_local, v); }
   /// World-space normal of a local one, up to scale: transpose(W2L) n; flips under mirroring like a flattened mesh's.
   vec3 normal_to_world(const vec3& n) const;
   /// The linear part of world_to_local.
   mat3 linear_to_local() const;
   /// The matrix and the handedness, of world_to_local's linear part and translation; its determinant is not 0.
   void set_inverse(const glm::dmat3& linear, const glm::dvec3& translation);
-
- private:
-  Float4 column(int i) const { return load4(&world_to_local[i].x); }  // reads on into what follows
 };
 static_assert(sizeof(InstanceRecord) == 64);
 
 /// An instance of `asset`, footprint not set. Errors: InvalidArgument (not finite, not invertible in float).
 Result<InstanceRecord> make_instance(uint32_t asset, const mat4x3& local_to_world);
+/// The same as an instance of what stands at a place of its asset's level: its local space is the part's.
+InstanceRecord placed(const InstanceRecord& instance, const Placement& placement);
 /// The largest factor by which the transform stretches a length: what instance scales mean for footprints, so that
 /// an instance that is squeezed along one axis keeps the detail along the others.
 float largest_stretch(const mat4x3& local_to_world);

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "base/result.h"
@@ -16,18 +17,37 @@ Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, 
                                      EmbreeFilter filter, void* user) {
   LevelScene result;
   if (!level.has_surface()) return result;
+  LoadTerms left = terms;
+  if (level.has_parts()) {
+    FARFIELD_TRY_LET(auto parts, PartScenes::build(device, level, terms, filter, user));
+    result.parts_ = std::make_unique<PartScenes>(std::move(parts));
+    result.most_held_before_ = result.parts_->most_held_bytes();
+    left.most_bytes -= std::min(left.most_bytes, result.parts_->bytes());
+  }
   const auto make = [&] {
-    std::vector<EmbreeGeometry> geometries;
-    geometries.push_back(new_quads(device.handle()));
-    const EmbreeGeometryRef quads = geometries.back().get();
-    share_array(quads, level.positions);
-    share_array(quads, level.quads);
-    if (filter) set_filter(quads, filter, user);
+    std::vector<EmbreeGeometry> geometries(1);
+    if (const auto own = level.quads.first(level.own_quad_count()); !own.empty()) {
+      geometries[0] = new_quads(device.handle());
+      const EmbreeGeometryRef quads = geometries[0].get();
+      share_array(quads, level.positions);
+      share_array(quads, own);
+      if (filter) set_filter(quads, filter, user);
+    }
+    if (result.parts_) geometries.push_back(result.parts_->make_geometry(device.handle()));
     return geometries;
   };
   FARFIELD_TRY_LET(result.built_,
-                   build_measured_scene(device, make, terms, fmt::format("the BVH of {} quads", level.quads.size())));
+                   build_measured_scene(device, make, left, fmt::format("the BVH of {} quads", level.quads.size())));
+  if (result.parts_) {
+    const uint64_t with_points = result.parts_->bytes();
+    result.parts_->forget_points();
+    result.built_.build_peak_bytes += with_points - result.parts_->bytes();
+  }
   return result;
+}
+
+uint64_t LevelScene::build_peak_bytes() const {
+  return std::max(built_.build_peak_bytes, most_held_before_ - std::min(most_held_before_, bytes()));
 }
 
 LevelCost level_cost(const LevelView& level, const LevelScene& scene) {

@@ -3,16 +3,18 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 
 #include "base/embree.h"
 #include "base/result.h"
 #include "bvh/bvh_device.h"
+#include "bvh/part_scenes.h"
 #include "cache/level.h"
 
 namespace farfield {
 
-/// A committed Embree scene of one quad geometry with geomID 0 and primID = index of the quad; nothing for a level
-/// without a surface. Movable; any thread may trace it.
+/// A committed Embree scene; nothing for a level without a surface. LevelView::quad_of() tells the quad of a hit's
+/// geomID and primID; hits on parts have the number of their place as instID[0]. Movable; any thread may trace it.
 class LevelScene {
  public:
   LevelScene() = default;
@@ -24,10 +26,12 @@ class LevelScene {
                                   EmbreeFilter filter = nullptr, void* user = nullptr);
 
   EmbreeSceneRef handle() const { return built_.scene.get(); }  ///< null without a surface
-  uint64_t bytes() const { return built_.bytes; }
-  uint64_t build_peak_bytes() const { return built_.build_peak_bytes; }
+  uint64_t bytes() const { return built_.bytes + (parts_ ? parts_->bytes() : 0); }
+  uint64_t build_peak_bytes() const;
 
  private:
+  std::unique_ptr<PartScenes> parts_;  ///< null without parts; the scene refers to it
+  uint64_t most_held_before_ = 0;      ///< at the worst moment of the parts' builds
   MeasuredScene built_;
 };
 

@@ -45,13 +45,14 @@ void opacity_filter(const EmbreeFilterArguments* args) {
   const auto& context = *reinterpret_cast<const RayContext*>(args->context);
   const auto& ray = *reinterpret_cast<const EmbreeRay*>(args->ray);
   const auto& hit = *reinterpret_cast<const EmbreeHit*>(args->hit);
-  const uint32_t face = level.face_of(hit.primID, quad_side(hit.u, hit.v));
+  const uint32_t quad = level.view.quad_of(hit.geomID, hit.primID);
+  const uint32_t face = level.face_of(quad, quad_side(hit.u, hit.v));
   const float gap = gap_along(level.view, face, ray, hit);
   if (gap > 0 && path_number(context, ray, kGapCell * level.view.header.resolution, 0) < gap) {
     args->valid[0] = 0;
     return;
   }
-  const float opacity = opacity_at(level, context, ray, hit.primID, face, face_barycentric(hit.u, hit.v));
+  const float opacity = opacity_at(level, context, ray, quad, face, face_barycentric(hit.u, hit.v));
   if (opacity < 1 && !(ray_number(context, ray, face) < opacity)) args->valid[0] = 0;
 }
 

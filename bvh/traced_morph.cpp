@@ -197,6 +197,9 @@ struct TracedMorph::SortedFaces {
 
 Result<std::unique_ptr<TracedMorph>> TracedMorph::make(BvhDevice& device, const LevelView& fine,
                                                        const LevelView& coarse, uint64_t most_bytes) {
+  if (fine.has_parts() || coarse.has_parts()) {
+    return make_error(ErrorCode::BadFile, "a level whose parts stand in several places does not morph");
+  }
   std::unique_ptr<TracedMorph> morph(new TracedMorph);
   std::vector<uint32_t>& targets = morph->coarse_face_;
   targets.assign(coarse.morph_face.begin(), coarse.morph_face.end());

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "cache/placed_parts.h"
+
 namespace farfield {
 
 namespace {
@@ -68,7 +70,7 @@ float reach_out_of_hull(const LevelView& level, std::span<const vec3> hull) {
   if (hull.empty()) return -kInfinity;
   Reach allowed, reach;
   for (const vec3& point : hull) allowed.extend(point);
-  for (const vec3& position : level.positions) reach.extend(position);
+  for_each_surface_point(level, [&](const vec3& point) { reach.extend(point); });
   for_each_brick(level, [&](const Brick& brick, const ivec3& coordinates) {
     const ivec3 corner = coordinates * kBrickSide;
     const float half_side = 0.5f * static_cast<float>(kBrickSide);

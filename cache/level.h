@@ -114,6 +114,15 @@ static_assert(sizeof(Brick) == 640);
 /// The box of the brick's voxels that are not empty, in voxels from its corner.
 Box3 active_box(const Brick& brick);
 
+/// Where a part of a level's surface stands. Parts are what a source shows many times (the leaves of a tree): a level 0
+/// may have the quads of each once, in a space of their own, and any number of places for it.
+struct Placement {
+  mat4x3 level_to_part{1.0f};  ///< from the level's space to the part's; invertible
+  uint32_t part = 0;
+  uint32_t source_face_offset = 0;  ///< added to the numbers that source_face has, which are those of the first place
+};
+static_assert(sizeof(Placement) == 56);
+
 /// Where a morph map sends things of level k-1 (thesis 8.1.2, 10.1.2).
 inline constexpr uint32_t kMorphVoxelized = 0xffffffffu;  ///< it became part of the volume of level k: fades out
 inline constexpr uint32_t kMorphCollapsed = 0xfffffffeu;  ///< (faces) its area shrinks to 0 while vertices move
@@ -206,7 +215,10 @@ inline size_t brick_table_index(const ivec3& dims, const ivec3& brick) {
   ARRAY(30, VoxelAlbedo,        voxel_albedo,         PackedAlbedo,      Voxels)        /* of fog; the header's */   \
   ARRAY(31, VoxelAnisotropy,    voxel_anisotropy,     int8_t,            Voxels)        /* of all that a voxel of fog scatters; the header's, of what is scattered once */ \
   /* sheets with gaps */                                                                                              \
-  ARRAY(32, FaceSheetShape,     face_sheet_shape,     PackedSheetShape,  Faces)         /* no sheet */
+  ARRAY(32, FaceSheetShape,     face_sheet_shape,     PackedSheetShape,  Faces)         /* no sheet */ \
+  /* level 0: what stands in many places. Quads before the first part's stand in the level's own space */              \
+  ARRAY(33, PartFirstQuad,      part_first_quad,      uint32_t,          Parts)         /* each part ends at the next */ \
+  ARRAY(34, Placements,         placements,           Placement,         Placements)
 // clang-format on
 
 /// The arrays, owned (Array = std::vector<T>) while baking, or as spans into a file in memory at run time.
@@ -218,6 +230,21 @@ struct LevelArrays {
 
   bool has_surface() const { return !quads.empty(); }
   bool has_volume() const { return !bricks.empty(); }
+  bool has_parts() const { return !placements.empty(); }
+  /// The quads that stand in the level's own space are those before this one.
+  uint32_t own_quad_count() const {
+    return static_cast<uint32_t>(part_first_quad.empty() ? quads.size() : part_first_quad.front());
+  }
+  /// The quad with the number prim_id among those of a part, or among those that stand in the level's own space
+  /// (geom_id 0). Part p is geometry p + 1 of its scene (bvh/part_scenes.h).
+  uint32_t quad_of(uint32_t geom_id, uint32_t prim_id) const {
+    return geom_id == 0 ? prim_id : part_first_quad[geom_id - 1] + prim_id;
+  }
+  /// The quads of a part: from the first up to the second.
+  std::array<uint32_t, 2> part_quads(uint32_t part) const {
+    const bool is_last = part + 1 == part_first_quad.size();
+    return {part_first_quad[part], is_last ? static_cast<uint32_t>(quads.size()) : part_first_quad[part + 1]};
+  }
 };
 
 template <typename T>

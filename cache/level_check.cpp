@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "cache/level_format.h"
+#include "cache/placed_parts.h"
 #include "scattering/fog_phase.h"
 #include "scattering/highlight_lean.h"
 #include "scattering/hot_spot.h"
@@ -132,6 +133,41 @@ Problem check_shading_vertices(const LevelView& level) {
   return check_lengths(level, SectionGroup::ShadingVertices, "shading vertices", count);
 }
 
+/// Places are where rays can go, and there are no more than can be looked at one by one.
+Problem check_placements(const LevelView& level) {
+  constexpr uint64_t kMostPlacedQuads = uint64_t{1} << 28;
+  uint64_t placed = 0;
+  for (size_t i = 0; i < level.placements.size(); ++i) {
+    const Placement& placement = level.placements[i];
+    if (placement.part >= level.part_first_quad.size()) {
+      return fmt::format("placements[{}] is of part {}, and there are {}", i, placement.part,
+                         level.part_first_quad.size());
+    }
+    if (!can_be_undone(placement.level_to_part)) return fmt::format("placements[{}] has no inverse", i);
+    const auto [first, end] = level.part_quads(placement.part);
+    placed += end - first;
+    if (placed > kMostPlacedQuads) return "its parts have too many quads in all places";
+  }
+  return {};
+}
+
+Problem check_parts(const LevelView& level) {
+  if (level.part_first_quad.empty() != level.placements.empty()) {
+    return "part_first_quad and placements do not go together";
+  }
+  for (size_t part = 0; part < level.part_first_quad.size(); ++part) {
+    const uint32_t first = level.part_first_quad[part];
+    const bool is_after_last = part == 0 || first > level.part_first_quad[part - 1];
+    if (!is_after_last || first >= level.quads.size()) {
+      return fmt::format("part_first_quad[{}] is {} of {} quads, and parts are not empty", part, first,
+                         level.quads.size());
+    }
+  }
+  const bool is_source = level.face_sggx.empty() && level.face_gap.empty();
+  if (level.has_parts() && !is_source) return "it has parts, and faces that are not those of a source";
+  return check_placements(level);
+}
+
 Problem check_surface(const LevelView& level) {
   if (Problem problem = check_quads(level)) return problem;
   if (Problem problem = check_face_numbers(level)) return problem;
@@ -140,6 +176,7 @@ Problem check_surface(const LevelView& level) {
   }
   if (!level.face_sheet_shape.empty() && level.face_gap.empty()) return "face_sheet_shape needs face_gap";
   if (Problem problem = check_shading_vertices(level)) return problem;
+  if (Problem problem = check_parts(level)) return problem;
   return check_lengths(level, SectionGroup::Faces, "faces", face_count(level));
 }
 
@@ -238,8 +275,18 @@ bool contains(const Box3& box, const vec3& p) {  // false for NaN
          p.z <= box.upper.z;
 }
 
+/// Those of parts are in spaces of their own: what rays can trace is all that is asked of them.
 Problem check_positions(const LevelView& level) {
-  const auto outside = [&](const vec3& p) { return !contains(level.header.bounds, p); };
+  std::vector<bool> is_of_part(level.positions.size());
+  for (size_t i = level.own_quad_count(); i < level.quads.size(); ++i) {
+    const Quad& quad = level.quads[i];
+    for (const uint32_t v : {quad.v0, quad.v1, quad.v2, quad.v3}) is_of_part[v] = true;
+  }
+  const Box3 anywhere{vec3(-kEmbreeLargest), vec3(kEmbreeLargest)};
+  const auto outside = [&](const vec3& p) {
+    const bool is_placed = is_of_part[static_cast<size_t>(&p - level.positions.data())];
+    return !contains(is_placed ? anywhere : level.header.bounds, p);
+  };
   const auto found = std::ranges::find_if(level.positions, outside);
   if (found == level.positions.end()) return {};
   return fmt::format("positions[{}] = ({}, {}, {}) is not inside the bounds", found - level.positions.begin(), found->x,

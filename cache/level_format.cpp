@@ -39,9 +39,10 @@ vec3 to_vec3(const std::array<float, 3>& stored) { return {stored[0], stored[1],
 /// The first version that has what a level needs, so that older readers read what they can.
 uint32_t version_of(const LevelHeader& level, std::span<const SectionEntry> table) {
   constexpr uint32_t kLastOfVersion1 = 18, kLastOfVersion2 = 27, kLastOfVersion3 = 28, kLastOfVersion5 = 29,
-                     kLastOfVersion6 = 31;
+                     kLastOfVersion6 = 31, kLastOfVersion7 = 32;
   const uint32_t last_section = table.empty() ? 0 : table.back().id;
-  if (last_section > kLastOfVersion6) return kLevelFileVersion;
+  if (last_section > kLastOfVersion7) return kLevelFileVersion;
+  if (last_section > kLastOfVersion6) return 7;
   if (level.medium != Medium::Flakes || last_section > kLastOfVersion5) return 6;
   if (level.highlight_lean != 0) return 5;
   if (level.open_side != vec3(0.0f) || last_section > kLastOfVersion3) return 4;

@@ -25,8 +25,8 @@ enum class LevelCheck;  // cache/level_file.h
 static_assert(std::endian::native == std::endian::little, "level files are little-endian and are used in place");
 
 /// 1 had arrays 1 to 18 alone, 2 those to 27 and no hot spot, 3 those to 28 and no open side, 5 those to 29 and no fog,
-/// 6 those to 31.
-inline constexpr uint32_t kLevelFileVersion = 7;
+/// 6 those to 31, 7 those to 32.
+inline constexpr uint32_t kLevelFileVersion = 8;
 /// Not text (first byte), and a copy in text mode breaks it (line ends), as in PNG.
 inline constexpr std::array<uint8_t, 8> kLevelFileMagic = {0x89, 'F', 'F', 'L', 'V', '\r', '\n', 0x1a};
 inline constexpr uint64_t kSectionAlignment = 64;  ///< a cache line; Brick needs it
@@ -56,7 +56,9 @@ enum class SectionGroup {
   Voxels,
   MorphVertices,
   MorphFaces,
-  ShadingVertices
+  ShadingVertices,
+  Parts,
+  Placements
 };
 
 /// Calls visit(id, group, array) for every array of a level, in file order. Level: LevelData or LevelView, const or

@@ -10,6 +10,7 @@
 #include "base/hash.h"
 #include "base/text.h"
 #include "cache/level_file.h"
+#include "cache/placed_parts.h"
 #include "export/level_grids.h"
 #include "export/surface_writers.h"
 
@@ -39,7 +40,7 @@ class Exporter {
       files.push_back(std::move(file));
     }
     note_other_parts(entries);
-    FARFIELD_TRY(is_volume_ ? write_volumes(entries, files) : write_surface(*entries.front(), files.front()->view()));
+    FARFIELD_TRY(is_volume_ ? write_volumes(entries, files) : write_placed_surface(*entries.front(), files.front()->view()));
     return std::move(report_);
   }
 
@@ -145,6 +146,13 @@ class Exporter {
       report_.levels.push_back(std::move(exported));
     }
     return write_volume(target_, out, job_);
+  }
+
+  /// The formats have no parts: each place has faces of its own.
+  Result<void> write_placed_surface(const LevelEntry& entry, const LevelView& view) {
+    if (!view.has_parts()) return write_surface(entry, view);
+    const LevelData flat = flattened(view);
+    return write_surface(entry, view_of(flat));
   }
 
   Result<void> write_surface(const LevelEntry& entry, const LevelView& view) {

@@ -446,11 +446,14 @@ class GltfMeshReader {
     const auto& mesh = model_.meshes[static_cast<size_t>(index)];
     const auto scheme = scheme_of_extras(mesh);
     if (!scheme) return document_.bad(fmt::format("mesh {}: {}", index, scheme.error().message));
+    const size_t first_face = mesh_.face_count();
     for (size_t p = 0; p < mesh.primitives.size(); ++p) {
       const auto place = fmt::format("mesh {} primitive {}", index, p);
       if (auto done = add_primitive(mesh.primitives[p], mesh.weights, to_world, place); !done) return done;
       mesh_.face_scheme.resize(mesh_.face_count(), *scheme);
     }
+    mesh_.placements.push_back(
+        {static_cast<uint32_t>(index), first_face, mesh_.face_count() - first_face, glm::dmat4x3(to_world)});
     return {};
   }
 

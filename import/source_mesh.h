@@ -42,6 +42,13 @@ struct SourceHeights {
   explicit operator bool() const { return map != nullptr; }
 };
 
+/// Where a mesh of a file stands: so many faces, one after the other.
+struct SourcePlacement {
+  uint32_t mesh = 0;  ///< places of equal numbers show the same faces in the same order
+  size_t first_face = 0, face_count = 0;
+  glm::dmat4x3 to_asset{1.0};  ///< from the mesh's space to that of positions
+};
+
 struct SourceMesh {
   std::vector<dvec3> positions;
   std::vector<uint32_t> face_begin{0};    ///< face i has the corners face_begin[i] .. face_begin[i + 1] - 1
@@ -56,6 +63,7 @@ struct SourceMesh {
   std::vector<float> face_height_scale;  ///< empty: 1; or per face: multiplies its heights, > 0
   /// Empty, or per face: which cage it is part of; none: as the caller asks. Parts share no edges.
   std::vector<std::optional<SubdivisionScheme>> face_scheme;
+  std::vector<SourcePlacement> placements;  ///< ascending; empty: nothing is known of what is repeated
   CageTags cage;                         ///< if the polygons are a subdivision cage: where it is sharp, and its rules
   bool is_split = false;                 ///< vertices are doubled where uv or normals differ, as glTF has them
   MaterialFunction material_function;    ///< a host's own; if set, `materials` give names and modes only

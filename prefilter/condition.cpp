@@ -135,6 +135,8 @@ class Triangulation {
     }
   }
 
+  const std::vector<uint32_t>& face_of_triangle() const { return face_of_triangle_; }  ///< of the mesh
+
  private:
   void add_face(size_t face, uint32_t source_face) {
     distinct_corners(mesh_, welded_, mesh_.face_begin[face], mesh_.face_begin[face + 1], corners_);
@@ -143,7 +145,7 @@ class Triangulation {
     bool has_area = false;
     const size_t first = surface_.triangles.size();
     for (const uvec3& t : triangulate_polygon(points_)) {
-      has_area |= add_triangle({corners_[t.x], corners_[t.y], corners_[t.z]}, mesh_.face_material[face], source_face);
+      has_area |= add_triangle({corners_[t.x], corners_[t.y], corners_[t.z]}, face, source_face);
     }
     if (!has_area) ++degenerate_;
     const bool is_quad = corners_.size() == 4 && surface_.triangles.size() == first + 2;
@@ -151,7 +153,7 @@ class Triangulation {
   }
 
   /// False: it has no area.
-  bool add_triangle(const uvec3& corner, uint32_t material, uint32_t source_face) {
+  bool add_triangle(const uvec3& corner, size_t face, uint32_t source_face) {
     surface_.triangles.push_back({vertex_of(corner.x), vertex_of(corner.y), vertex_of(corner.z)});
     const dvec3 area = surface_.area_vector(surface_.triangles.size() - 1);
     const bool has_area = glm::dot(area, area) > 0;
@@ -159,8 +161,9 @@ class Triangulation {
       surface_.triangles.pop_back();
       return has_area;
     }
-    surface_.material.push_back(material);
+    surface_.material.push_back(mesh_.face_material[face]);
     surface_.source_face.push_back(source_face);
+    face_of_triangle_.push_back(static_cast<uint32_t>(face));
     add_corners(corner, mesh_.corner_uv, surface_.corner_uv);
     add_corners(corner, mesh_.corner_color, surface_.corner_color);
     add_corners(corner, mesh_.corner_normal, surface_.corner_normal);
@@ -190,6 +193,7 @@ class Triangulation {
   std::unordered_set<uvec3, TriangleKeyHash> seen_;
   size_t degenerate_ = 0, repeated_ = 0;
   uint32_t quads_ = 0;
+  std::vector<uint32_t> face_of_triangle_;
   std::vector<uint32_t> corners_;
   std::vector<dvec3> points_;
 };
@@ -242,8 +246,37 @@ std::vector<std::string> limit(std::vector<std::string> warnings) {
 
 tl::unexpected<Error> cancelled() { return make_error(ErrorCode::Cancelled, "import: cancelled"); }
 
+/// Per face: its place, or kNoIndex; nothing if no mesh has several. file_face: of each face its number in the file.
+std::vector<uint32_t> places_of_faces(const SourceMesh& mesh, const std::vector<uint32_t>& file_face) {
+  std::unordered_set<uint32_t> meshes;
+  const auto is_new = [&](const SourcePlacement& placement) { return meshes.insert(placement.mesh).second; };
+  if (std::ranges::all_of(mesh.placements, is_new)) return {};
+  std::vector<uint32_t> places(file_face.size(), kNoIndex);
+  uint32_t place = 0;  // both ascend
+  for (size_t face = 0; face < file_face.size(); ++face) {
+    while (place < mesh.placements.size() &&
+           mesh.placements[place].first_face + mesh.placements[place].face_count <= file_face[face]) {
+      ++place;
+    }
+    if (place < mesh.placements.size() && mesh.placements[place].first_face <= file_face[face]) places[face] = place;
+  }
+  return places;
+}
+
+/// Says of each triangle in which place it is. place: per face of the mesh.
+void add_placements(const SourceMesh& mesh, const std::vector<uint32_t>& place,
+                    const std::vector<uint32_t>& face_of_triangle, SourceSurface& surface) {
+  if (place.empty()) return;
+  for (const uint32_t face : face_of_triangle) surface.placement.push_back(place[face]);
+  for (const SourcePlacement& from : mesh.placements) {
+    surface.placements.push_back({from.mesh, from.to_asset});
+    surface.placements.back().to_surface[3] -= surface.origin;
+  }
+}
+
 Result<ImportedAsset> condition_mesh(SourceMesh& mesh, const std::string& name, const Job& job) {
   std::vector<uint32_t> source_face = drop_faces_that_are_not_finite(mesh);
+  const std::vector<uint32_t> place = places_of_faces(mesh, source_face);
   if (!mesh.face_number.empty()) {
     for (uint32_t& face : source_face) face = mesh.face_number[face];
   }
@@ -266,8 +299,10 @@ Result<ImportedAsset> condition_mesh(SourceMesh& mesh, const std::string& name, 
   surface.materials = std::move(mesh.materials);
   surface.material_function = std::move(mesh.material_function);
   surface.material_batch = std::move(mesh.material_batch);
-  Triangulation(mesh, welded, surface).run(source_face, job);
+  Triangulation triangulation(mesh, welded, surface);
+  triangulation.run(source_face, job);
   if (job.is_cancelled()) return cancelled();
+  add_placements(mesh, place, triangulation.face_of_triangle(), surface);
   if (surface.triangles.empty()) {
     return make_error(ErrorCode::BadFile, fmt::format("{}: no face has any area", name));
   }

@@ -15,6 +15,12 @@ namespace farfield {
 /// Texture coordinates of a triangle's corners.
 using UvTriangle = std::array<vec2, 3>;
 
+/// A place of a mesh that the source may show in several.
+struct SurfacePlacement {
+  uint32_t mesh = 0;
+  glm::dmat4x3 to_surface{1.0};  ///< from the mesh's space to that of positions
+};
+
 /// Triangles over welded vertices. What varies inside a face lies at its corners: corner c of triangle t is 3 t + c.
 /// Arrays of corners are empty where the source says nothing.
 struct SourceSurface {
@@ -27,6 +33,8 @@ struct SourceSurface {
   std::vector<uint32_t> source_face;  ///< per triangle: the polygon of the file that it is a part of
   std::vector<uint32_t> quad;         ///< per triangle, as Surface::quad: halves of polygons with four corners
   std::vector<uint8_t> on_cut;  ///< per vertex: other tiles have it too, it stays where it is; empty: this is no tile
+  std::vector<uint32_t> placement;  ///< per triangle: index into placements or kNoIndex; empty: nothing is repeated
+  std::vector<SurfacePlacement> placements;
   std::vector<SourceMaterial> materials;
   MaterialFunction material_function;    ///< the host's, if it has one: then `materials` give names only
   MaterialBatchFunction material_batch;  ///< answers as material_function, many places at once; may be empty

@@ -134,7 +134,10 @@ void InteractionModel::put(Interaction& interaction, const InteractionModel& mod
 }
 
 bool is_hit_of(const TracedLevel& level, const HitRecord& hit) {
-  return hit.is_volume ? hit.element < level.voxel_count : hit.element / 2 < level.view.quad_first_face.size();
+  const LevelView& view = level.view;
+  if (hit.is_volume) return hit.element < level.voxel_count;
+  const bool is_at_a_place = hit.placement == kNoPlacement || hit.placement < view.placements.size();
+  return is_at_a_place && hit.element / 2 < view.quad_first_face.size();
 }
 
 namespace {
@@ -303,10 +306,15 @@ Interaction make_interaction(const HitLevels& levels, const InstanceRecord& inst
     return interaction;
   }
   interaction.kind = Interaction::Kind::Surface;
+  const bool is_part = hit.placement != kNoPlacement;
+  const InstanceRecord& of_surface = is_part ? placed(instance, view.placements[hit.placement]) : instance;
   const vec3 normal_local(hit.normal_local[0], hit.normal_local[1], hit.normal_local[2]);
-  const vec3 normal = glm::normalize(instance.normal_to_world(glm::normalize(normal_local)));
+  const vec3 normal = glm::normalize(of_surface.normal_to_world(glm::normalize(normal_local)));
   interaction.geometric_normal = glm::dot(normal, interaction.wo) < 0.0f ? -normal : normal;
-  const FaceShading shading = shade_surface(levels, instance, hit, direction, interaction);
+  const FaceShading shading = shade_surface(levels, of_surface, hit, direction, interaction);
+  if (is_part && interaction.source_face != kNoMaterial) {
+    interaction.source_face += view.placements[hit.placement].source_face_offset;
+  }
   const SurfaceParams& params = shading.params;
   set_reflectance(interaction.reflectance, params);
   interaction.albedo = layered_albedo(params.specular, params.diffuse + params.transmission);

@@ -501,7 +501,8 @@ class Document:
         return len(self.json["meshes"]) - 1
 
     def write(self, name):
-        self.json["scenes"] = [{"nodes": list(range(len(self.json["nodes"])))}]
+        children = {child for node in self.json["nodes"] for child in node.get("children", ())}
+        self.json["scenes"] = [{"nodes": [n for n in range(len(self.json["nodes"])) if n not in children]}]
         (self.folder / name).write_text(json.dumps(self.json, separators=(",", ":")))
 
 

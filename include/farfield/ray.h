@@ -11,6 +11,7 @@
 namespace farfield {
 
 inline constexpr uint32_t kNoInstance = 0xffffffffu;
+inline constexpr uint32_t kNoPlacement = 0xffffffffu;
 
 /// What Farfield remembers of the nearest hit on its geometry, enough to rebuild the interaction. Opaque to hosts.
 struct HitRecord {
@@ -22,9 +23,10 @@ struct HitRecord {
   float blend = 0;                    ///< in (0, 1): of a morph from level_slot to the next; 0: of that level alone
   float lambda = 0;                   ///< continuous level that was asked for
   float footprint = 0;                ///< world width of what the ray stands for there
-  float normal_local[3] = {0, 0, 0};  ///< geometric normal, instance space, unnormalised; surfaces only
+  float normal_local[3] = {0, 0, 0};  ///< geometric normal, unnormalised, in the instance's or part's space; surfaces
   float barycentric[2] = {0, 0};      ///< weights of the face's second and third corner; surfaces only
   float attenuation = 0;              ///< of the medium that was met there, per unit of tfar; volumes only
+  uint32_t placement = kNoPlacement;  ///< of a part that stands in several places of its asset: which
 };
 
 namespace detail {

@@ -18,6 +18,7 @@
 #include "bvh/ray_cost.h"
 #include "cache/level_file.h"
 #include "cache/manifest.h"
+#include "cache/placed_parts.h"
 #include "scattering/warp.h"
 #include "tests/support/random_unit.h"
 
@@ -86,10 +87,11 @@ class LevelAsset : public LevelSource {
   std::vector<std::unique_ptr<InstanceGeometry>> geometries_;
 };
 
-EmbreeScene native_scene(EmbreeDeviceRef device, const LevelView& level, const std::vector<mat4x3>& places) {
+EmbreeScene native_scene(EmbreeDeviceRef device, const LevelView& stored, const std::vector<mat4x3>& places) {
+  const LevelData level = flattened(stored);
   const EmbreeGeometry quads = new_quads(device);
-  copy_array(quads.get(), level.positions);
-  copy_array(quads.get(), level.quads);
+  copy_array(quads.get(), std::span<const vec3>(level.positions));
+  copy_array(quads.get(), std::span<const Quad>(level.quads));
   const EmbreeScene object = build_static_scene(device, quads);
   EmbreeScene scene = new_scene(device);
   for (const mat4x3& place : places) {

@@ -51,6 +51,7 @@ TEST(FuzzReplay, LevelFile) {
   run_damaged(fuzz_level_file, FARFIELD_TEST_DATA "/format_v4/level_3.ffl");
   run_damaged(fuzz_level_file, FARFIELD_TEST_DATA "/format_v5/level_3.ffl");
   run_damaged(fuzz_level_file, FARFIELD_TEST_DATA "/format_v7/level_3.ffl");
+  run_damaged(fuzz_level_file, FARFIELD_TEST_DATA "/format_v8/level_3.ffl");
 }
 
 TEST(FuzzReplay, Manifest) {

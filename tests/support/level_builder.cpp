@@ -282,6 +282,14 @@ LevelData full_level_of_version_7() {
   return level;
 }
 
+LevelData full_level_of_version_8() {
+  LevelData level = full_level_of_version_2();
+  level.face_sggx.clear();
+  level.part_first_quad = {1};
+  level.placements = {{mat4x3(1.0f), 0, 0}, {mat4x3(0, -2, 0, 2, 0, 0, 0, 0, 2, 1, -1, 0.5f), 0, 7}};
+  return level;
+}
+
 LevelData full_level_of_version_6() {
   LevelData level = full_level_of_version_2();
   for (auto* flakes : {&level.voxel_diffuse, &level.voxel_specular, &level.voxel_transmission}) flakes->clear();

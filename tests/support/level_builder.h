@@ -70,6 +70,8 @@ LevelData full_level_of_version_5();
 LevelData full_level_of_version_6();
 /// Version 4 with what version 7 added: shapes of sheets.
 LevelData full_level_of_version_7();
+/// Version 2 with what version 8 added: its second quad is a part that stands in two places.
+LevelData full_level_of_version_8();
 
 /// A random sound level: `quads` quads, `bricks` bricks, channels picked by the seed.
 LevelData random_level(uint64_t seed, uint32_t quads, uint32_t bricks);

@@ -228,6 +228,50 @@ TEST(LevelFormat, GoldenBytesOfVersion7AreFrozen) {
   expect_frozen("/format_v7/level_3.ffl", 4480u, test::full_level_of_version_7());
 }
 
+TEST(LevelFormat, GoldenBytesOfVersion8AreFrozen) {
+  expect_frozen("/format_v8/level_3.ffl", 4352u, test::full_level_of_version_8());
+}
+
+TEST(LevelFormat, PlacesOfPartsAreChecked) {
+  const auto problem = [](const std::function<void(LevelData&)>& spoil) {
+    LevelData level = test::full_level_of_version_8();
+    spoil(level);
+    const auto in_structure = find_structure_problem(view_of(level));
+    return in_structure ? *in_structure : find_value_problem(view_of(level)).value_or("");
+  };
+  EXPECT_EQ(problem([](LevelData&) {}), "");
+  EXPECT_EQ(problem([](LevelData& l) { l.placements.clear(); }), "part_first_quad and placements do not go together");
+  EXPECT_EQ(problem([](LevelData& l) { l.part_first_quad.clear(); }), "part_first_quad and placements do not go together");
+  EXPECT_EQ(problem([](LevelData& l) { l.part_first_quad = {2}; }),
+            "part_first_quad[0] is 2 of 2 quads, and parts are not empty");
+  EXPECT_EQ(problem([](LevelData& l) { l.part_first_quad = {1, 1}; }),
+            "part_first_quad[1] is 1 of 2 quads, and parts are not empty");
+  EXPECT_EQ(problem([](LevelData& l) { l.placements[1].part = 1; }), "placements[1] is of part 1, and there are 1");
+  EXPECT_EQ(problem([](LevelData& l) { l.placements[0].level_to_part[2] = vec3(0); }), "placements[0] has no inverse");
+  EXPECT_EQ(problem([](LevelData& l) { l.placements[0].level_to_part[3].x = NAN; }), "placements[0] has no inverse");
+  EXPECT_EQ(problem([](LevelData& l) { l.placements[0].level_to_part[3].x = 1e19f; }), "placements[0] has no inverse");
+  EXPECT_EQ(problem([](LevelData& l) { l.placements[0].level_to_part = mat4x3(1e-30f); }), "placements[0] has no inverse");
+  EXPECT_EQ(problem([](LevelData& l) { l.face_gap.resize(3); }), "it has parts, and faces that are not those of a source");
+  // A part's own space is not the level's.
+  EXPECT_EQ(problem([](LevelData& l) { l.positions[3] = vec3(-1e9f); l.quads = {{0, 1, 0, 2}, {3, 3, 3, 3}}; }),
+            "");
+  EXPECT_EQ(problem([](LevelData& l) { l.positions[1] = vec3(1e9f); }),
+            "positions[1] = (1000000000, 1000000000, 1000000000) is not inside the bounds");
+  EXPECT_EQ(problem([](LevelData& l) { l.positions[3] = vec3(NAN); l.quads = {{0, 1, 0, 2}, {3, 3, 3, 3}}; }),
+            "positions[3] = (nan, nan, nan) is not inside the bounds");
+}
+
+TEST(LevelFormat, PartsInTooManyPlacesAreRefused) {
+  LevelData level = test::empty_level(0, 1);
+  std::vector<Quad> quads(1 << 15, Quad{0, 1, 2, 2});
+  test::set_quads(level, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, quads);
+  level.part_first_quad = {0};
+  level.placements.resize(1 << 13);
+  EXPECT_EQ(find_structure_problem(view_of(level)).value_or(""), "");
+  level.placements.resize((1 << 13) + 1);
+  EXPECT_EQ(find_structure_problem(view_of(level)).value_or(""), "its parts have too many quads in all places");
+}
+
 TEST(LevelFormat, ShapesOfSheetsNeedGaps) {
   LevelData level = test::full_level_of_version_7();
   level.face_gap.clear();
@@ -392,7 +436,7 @@ TEST(HostileLevelFile, HeaderAndTableFieldsAreChecked) {
   const std::vector<Case> cases = {
       {"does not start as a level file", [](auto& h, auto*) { h.magic[1] = 'X'; }},
       {"the format version is 0", [](auto& h, auto*) { h.version = 0; }},
-      {"level format 8, and this Farfield reads up to 7", [](auto& h, auto*) { h.version = 8; },
+      {"level format 9, and this Farfield reads up to 8", [](auto& h, auto*) { h.version = 9; },
        ErrorCode::Unsupported},
       {"the header says", [](auto& h, auto*) { h.file_bytes = kHuge; }},
       {"sections leaves the file", [](auto& h, auto*) { h.section_count = 0xffffffffu; }},

@@ -128,6 +128,8 @@ TEST(LevelView, ShowsEveryArrayOfItsLevel) {
   LevelData level = test::full_level_of_version_7();
   level.voxel_albedo = test::full_level_of_version_6().voxel_albedo;  // which no valid level has beside flakes
   level.voxel_anisotropy = test::full_level_of_version_6().voxel_anisotropy;
+  level.part_first_quad = test::full_level_of_version_8().part_first_quad;  // nor with pieces
+  level.placements = test::full_level_of_version_8().placements;
   const LevelView view = view_of(level);
   std::vector<std::span<const std::byte>> owned, seen;
   for_each_section(level, [&](SectionId, const auto& array) { owned.push_back(std::as_bytes(std::span(array))); });
@@ -154,7 +156,7 @@ TEST(SectionName, IsDifferentForEachSection) {
   std::set<std::string_view> names;
   const LevelView view;
   for_each_section(view, [&](SectionId id, const auto&) { names.insert(section_name(id)); });
-  EXPECT_EQ(names.size(), 32u);
+  EXPECT_EQ(names.size(), 34u);
   EXPECT_FALSE(names.contains(section_name(SectionId{0})));
 }
 

@@ -77,6 +77,8 @@ const std::set<std::string> kMayNameEmbree = {
     // the callbacks, with Embree's arguments
     "bvh/instance_geometry.cpp",
     "bvh/instance_geometry.h",
+    "bvh/part_scenes.cpp",
+    "bvh/part_scenes.h",
     // what hosts see, and its definitions
     "include/farfield/farfield.h",
     "include/farfield/ray.h",

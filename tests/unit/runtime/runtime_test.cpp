@@ -14,6 +14,7 @@
 #include "base/vec.h"
 #include "bvh/level_scene.h"
 #include "cache/manifest.h"
+#include "cache/placed_parts.h"
 #include "tests/support/asset_writer.h"
 #include "tests/support/files.h"
 #include "tests/support/level_builder.h"
@@ -1009,6 +1010,88 @@ TEST_F(RuntimeTest, InteractionsSayWhereAndHow) {
   // From inside, the normal is on the other side.
   ASSERT_TRUE(host.trace({1, 2, 3}, {0, 0.01f, -1}, context, hit));
   EXPECT_NEAR(host.interaction(hit, context).geometric_normal.z, 1.0f, 0.01f);
+}
+
+/// White spheres with smooth normals: one that stands for itself, and a part in three places.
+std::vector<LevelData> spheres_in_places() {
+  LevelData level = test::sphere_level(vec3(0), 1, 16);
+  const auto count = static_cast<uint32_t>(level.quads.size());
+  const uint32_t faces = face_count(level), vertices = static_cast<uint32_t>(level.positions.size());
+  const LevelData once = level;
+  for (const vec3& p : once.positions) level.positions.push_back(p);
+  for (const Quad& q : once.quads) {
+    level.quads.push_back({q.v0 + vertices, q.v1 + vertices, q.v2 + vertices, q.v3 + vertices});
+  }
+  for (uint32_t i = 0; i < count; ++i) level.quad_first_face.push_back(once.quad_first_face[i] + faces);
+  for (uint32_t q = 0; q < 2 * count; ++q) {
+    const uint32_t first = level.quad_first_face[q];
+    for (uint32_t side = 0; side < (level.quads[q].is_pair() ? 2u : 1u); ++side) {
+      level.corner_vertex.push_back(level.quads[q].face(side) % vertices);
+      level.source_face.push_back((first + side) << kSourceTurnBits);
+    }
+  }
+  for (const vec3& p : once.positions) level.shading_normal.push_back(pack_normal(glm::normalize(p)));
+  level.part_first_quad = {count};
+  level.placements = {{mat4x3(1, 0, 0, 0, 1, 0, 0, 0, 1, -3, 0, 0), 0, 0},
+                      {mat4x3(0, 2, 0, -1, 0, 0, 0, 0, 1, 0, 4, 0), 0, 1000},     // squeezed
+                      {mat4x3(-1, 0, 0, 0, 1, 0, 0, 0, 1, 3, 0, 3), 0, 2000}};  // mirrored
+  level.header.bounds = {vec3(-4, -4, -4), vec3(5, 4, 4)};
+  set_diffuse(level, vec3(1));
+  LevelData root = test::sphere_level(vec3(0), 1, 4, 5, 3.2f);
+  root.header.bounds = level.header.bounds;
+  set_diffuse(root, vec3(1));
+  return {level, root};
+}
+
+TEST_F(RuntimeTest, InteractionsOnPartsAreThoseOfTheFlatLevel) {
+  std::vector<LevelData> levels = spheres_in_places();
+  write_asset(path_of("parts.farfield"), levels);
+  levels[0] = flattened(view_of(levels[0]));
+  write_asset(path_of("flat.farfield"), levels);
+  Host parts(with_lambda(0.0f)), flat(with_lambda(0.0f));
+  const mat4x3 transform(0, 2, 0.5f, -1.5f, 0, 0, 0.3f, 0, 2, 10, 20, 30);
+  parts.add(path_of("parts.farfield"), {transform});
+  flat.add(path_of("flat.farfield"), {transform});
+  parts.plan();
+  flat.plan();
+  Rng rng(5);
+  std::set<uint32_t> places;
+  int hits = 0, different = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const vec3 target = transform * vec4(4.0f * test::random_unit(rng), 1), origin = target + 20.0f * test::random_unit(rng);
+    RayContext context, flat_context;
+    EmbreeRayHit hit, flat_hit;
+    const vec3 direction = glm::normalize(transform * vec4(0, 0, 0, 1) - origin);
+    const bool is_hit = parts.trace(origin, direction, context, hit);
+    ASSERT_EQ(flat.trace(origin, direction, flat_context, flat_hit), is_hit);
+    if (!is_hit) continue;
+    ++hits;
+    places.insert(context.hit.placement);
+    const Interaction a = parts.interaction(hit, context), b = flat.interaction(flat_hit, flat_context);
+    EXPECT_NEAR(hit.ray.tfar, flat_hit.ray.tfar, 1e-4f);
+    const bool is_same = glm::length(a.geometric_normal - b.geometric_normal) < 1e-4f &&
+                         glm::length(a.shading_normal - b.shading_normal) < 2e-3f && a.source_face == b.source_face;
+    different += !is_same;
+    EXPECT_NEAR(a.albedo.y, b.albedo.y, 1e-6f);
+    // Nothing hides the hit from itself.
+    RayContext next;
+    next.set_origin(context.hit);
+    EmbreeRayHit behind;
+    const vec3 away = a.geometric_normal;
+    if (parts.trace(a.ray_origin(away), away, next, behind)) {
+      EXPECT_GT(behind.ray.tfar, 1e-3f);
+    }
+  }
+  EXPECT_GT(hits, 1000);
+  EXPECT_EQ(places.size(), 4u);
+  EXPECT_LT(different, hits / 200);  // at edges
+  HitRecord broken;
+  broken.instance = 0;
+  RayContext of_nowhere;
+  EmbreeRayHit hit;
+  ASSERT_TRUE(parts.trace(transform * vec4(0, 0, 9, 1), -vec3(transform[2]), of_nowhere, hit));
+  of_nowhere.hit.placement = 3;
+  EXPECT_EQ(parts.interaction(hit, of_nowhere).kind, Interaction::Kind::None);
 }
 
 TEST_F(RuntimeTest, InteractionsSayWhatTheirLightMeets) {
