@@ -44,6 +44,7 @@ Result<bool> LevelWriter::write(const LevelView& level, uint32_t grid, uint64_t 
   entry.grid = grid;
   entry.file = fmt::format("level_{}.ffl", entry.level);
   entry.triangles = face_count(level);
+  entry.placements = level.placements.size();
   entry.voxels = voxel_count(level);
   entry.bricks = level.bricks.size();
   entry.resident_bytes = cost.resident_bytes;

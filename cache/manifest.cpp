@@ -62,7 +62,7 @@ Problem find_level_problem(const LevelEntry& level) {
        {level.file_bytes, level.resident_bytes, level.build_peak_bytes, morph.resident_bytes, morph.build_peak_bytes}) {
     if (bytes > kMaxBytes) return fmt::format("{} bytes are more than any level has", bytes);
   }
-  for (const uint64_t count : {level.triangles, level.voxels, level.bricks}) {
+  for (const uint64_t count : {level.triangles, level.placements, level.voxels, level.bricks}) {
     if (count > kMaxElements) return fmt::format("{} elements are more than any level has", count);
   }
   if (!std::isfinite(level.ray_cost) || level.ray_cost < 0) return "its ray_cost is negative or not finite";
@@ -172,6 +172,7 @@ LevelEntry level_from_json(const Json& json, const std::string& where, FieldRead
   level.file_bytes = read.count(json, "file_bytes", where);
   level.file_hash = read.hash(json, "file_hash", where);
   level.triangles = read.count(json, "triangles", where);
+  if (json.is_object() && json.contains("placements")) level.placements = read.count(json, "placements", where);
   level.voxels = read.count(json, "voxels", where);
   level.bricks = read.count(json, "bricks", where);
   level.resident_bytes = read.count(json, "resident_bytes", where);
@@ -273,6 +274,7 @@ OrderedJson to_json(const LevelEntry& level) {
                       {"bricks", level.bricks},
                       {"resident_bytes", level.resident_bytes},
                       {"build_peak_bytes", level.build_peak_bytes}};
+  if (level.placements != 0) json["placements"] = level.placements;
   if (level.ray_cost != 0) json["ray_cost"] = level.ray_cost;
   if (level.morph) {
     json["morph_resident_bytes"] = level.morph->resident_bytes;

@@ -79,6 +79,7 @@ class Verifier {
     const uint64_t hash = hash_bytes(file.bytes());
     if (entry.file_hash != hash) mismatch("the file's hash", to_hex(entry.file_hash), to_hex(hash));
     expect_count("the number of triangles", entry.triangles, face_count(level));
+    expect_count("the number of places of parts", entry.placements, level.placements.size());
     expect_count("the number of voxels", entry.voxels, voxel_count(level));
     expect_count("the number of bricks", entry.bricks, level.bricks.size());
     expect_count("the level's number", entry.level, level.header.level);
@@ -159,6 +160,9 @@ class Verifier {
   void check_morph(const LevelView& level, const LevelFile* finer, bool is_first) {
     const bool has_morph = !level.morph_vertex.empty() || !level.morph_face.empty();
     if (!has_morph) return;
+    if (finer && finer->view().has_parts()) {
+      return error(fmt::format("{}: it has a morph map from a level with parts; bake the asset again", file_));
+    }
     if (is_first) return error(fmt::format("{}: the finest level has a morph map; bake the asset again", file_));
     if (!finer) return;  // that level could not be read, which is a finding already
     expect_morph("vertices", level.morph_vertex.size(), finer->view().positions.size());

@@ -56,6 +56,7 @@ Json level_json(const Manifest& manifest, const LevelEntry& level) {
                {"bytes_build_peak", level.build_peak_bytes},
                {"file", level.file},
                {"file_hash", to_hex(level.file_hash)}};
+  if (level.placements > 0) json["placements"] = level.placements;
   if (level.ray_cost > 0) json["ray_cost"] = level.ray_cost;
   if (level.errors) {
     json["occlusion_error"] = level.errors->occlusion_error;
@@ -87,6 +88,10 @@ std::string info_table(const std::string& name, const Manifest& manifest) {
                                                  "on disk", "resident", "occlusion", "rms", "color"}};
   for (const LevelEntry& level : manifest.levels) rows.push_back(level_row(manifest, level));
   text += format_table(rows);
+  for (const LevelEntry& level : manifest.levels) {
+    if (level.placements == 0) continue;
+    text += fmt::format("level {}: what it repeats counts once, and stands in {} places\n", level.level, level.placements);
+  }
   if (std::none_of(manifest.levels.begin(), manifest.levels.end(), [](const auto& level) { return level.errors; }))
     text += "errors: not evaluated yet, see farfield evaluate --help\n";
   return text;

@@ -22,6 +22,7 @@ Json level_json(const LevelEntry& entry, const BakeReport& report) {
                {"bytes_resident", entry.resident_bytes},
                {"bytes_build_peak", entry.build_peak_bytes},
                {"file", entry.file}};
+  if (entry.placements > 0) json["placements"] = entry.placements;
   const auto stages = std::find_if(report.levels.begin(), report.levels.end(),
                                    [&](const LevelReport& level) { return level.level == entry.level; });
   if (stages == report.levels.end()) return json;

@@ -39,6 +39,7 @@ void write_entry(const std::filesystem::path& folder, const LevelData& level, co
   entry.file_bytes = or_stop(write_level(folder / entry.file, level));
   entry.file_hash = or_stop(hash_file(folder / entry.file));
   entry.triangles = face_count(level);
+  entry.placements = level.placements.size();
   entry.voxels = voxel_count(level);
   entry.bricks = level.bricks.size();
   entry.resident_bytes = cost.resident_bytes;

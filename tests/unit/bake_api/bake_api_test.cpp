@@ -6,10 +6,15 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <set>
+#include <tuple>
 
+#include "bake/measure_levels.h"
 #include "bake_api/gather_mesh.h"
 #include "bake_api/source_from_input.h"
+#include "cache/level_file.h"
 #include "cache/manifest.h"
+#include "cache/placed_parts.h"
 #include "farfield/bake.h"
 #include "prefilter/condition.h"
 #include "prefilter/subdivide.h"
@@ -395,6 +400,108 @@ TEST_F(BakeApiCage, RefusesSubdivisionsThatMakeNoSense) {
   settings.subdivision.error = -1;
   EXPECT_EQ(code_of(bake_meshes(cube.input(false), out, settings)), ErrorCode::InvalidArgument);
   EXPECT_FALSE(fs::exists(out));
+}
+
+/// A ribbon of quads that is shown many times, beside one that is not.
+BakeInput ribbons(int places) {
+  BakeInput input;
+  input.name = "ribbons";
+  for (const int quads : {200, 30}) {
+    std::vector<vec3> points;
+    std::vector<uint32_t> corners, counts;
+    for (int i = 0; i <= quads; ++i) {
+      const float angle = 0.1f * static_cast<float>(i);
+      for (const float z : {0.0f, 0.2f}) points.emplace_back(std::cos(angle), 0.01f * static_cast<float>(i), z + std::sin(angle));
+    }
+    for (uint32_t i = 0; i < static_cast<uint32_t>(quads); ++i) {
+      corners.insert(corners.end(), {2 * i, 2 * i + 1, 2 * i + 3, 2 * i + 2});
+      counts.push_back(4);
+    }
+    BakeMesh& mesh = input.meshes.emplace_back();
+    mesh.points = points;
+    mesh.corners = corners;
+    mesh.counts = counts;
+  }
+  input.instances = {{1, glm::dmat4x3(1.0)}};
+  for (int i = 0; i < places; ++i) {
+    const double angle = i, scale = i % 3 == 2 ? -0.5 : 1.0;
+    const glm::dmat4x3 place(scale * std::cos(angle), scale * std::sin(angle), 0, -std::sin(angle), std::cos(angle), 0, 0,
+                             0, 1, 3 * (i % 5), 3 * (i / 5), i);
+    input.instances.push_back({0, place});
+  }
+  return input;
+}
+
+/// All quads' corners of a flat level, in an order of their own.
+std::multiset<std::tuple<int, int, int>> corners_of(const LevelData& level) {
+  std::multiset<std::tuple<int, int, int>> corners;
+  const auto round = [](float x) { return static_cast<int>(std::lround(1000 * x)); };
+  for (const Quad& quad : level.quads) {
+    for (const uint32_t v : {quad.v0, quad.v1, quad.v2, quad.v3}) {
+      const vec3& p = level.positions[v];
+      corners.emplace(round(p.x), round(p.y), round(p.z));
+    }
+  }
+  return corners;
+}
+
+TEST(BakeApiParts, WhatIsShownManyTimesIsKeptOnceAndStandsWhereItStood) {
+  const test::TemporaryFolder folder;
+  const std::string out = (folder.path() / "ribbons.farfield").string();
+  BakeInput input = ribbons(30);
+  const auto baked = bake_meshes(input, out, source_only());
+  ASSERT_TRUE(baked) << baked.error().message;
+  EXPECT_EQ(baked->levels[0].triangles, 2 * 230u);
+  EXPECT_EQ(read_manifest(out)->levels[0].placements, 30u);
+  EXPECT_TRUE(verify_and_measure_asset(out).findings.empty());
+  const auto file = LevelFile::open(fs::path(out) / "level_0.ffl", LevelCheck::Full);
+  ASSERT_TRUE(file);
+  ASSERT_TRUE((*file)->view().has_parts());
+
+  // The same as meshes of their own, which nothing repeats.
+  BakeInput apart = input;
+  apart.meshes.clear();
+  for (BakeInstance& instance : apart.instances) {
+    apart.meshes.push_back(input.meshes[instance.mesh]);
+    instance.mesh = static_cast<uint32_t>(apart.meshes.size() - 1);
+  }
+  const std::string flat_out = (folder.path() / "flat.farfield").string();
+  const auto flat = bake_meshes(apart, flat_out, source_only());
+  ASSERT_TRUE(flat) << flat.error().message;
+  EXPECT_EQ(flat->levels[0].triangles, 2 * (30 + 30 * 200u));
+  EXPECT_GT(flat->levels[0].resident_bytes, 6 * baked->levels[0].resident_bytes);
+  const auto flat_file = LevelFile::open(fs::path(flat_out) / "level_0.ffl", LevelCheck::Full);
+  ASSERT_TRUE(flat_file);
+  EXPECT_EQ(corners_of(flattened((*file)->view())), corners_of(copy_of((*flat_file)->view())));
+}
+
+TEST(BakeApiParts, LevelsAboveAreMadeOfAllPlacesAndDoNotMorphFromThem) {
+  const test::TemporaryFolder folder;
+  const std::string out = (folder.path() / "ribbons.farfield").string();
+  BakeSettings settings = small_settings();
+  settings.finest_grid = 16;
+  const auto baked = bake_meshes(ribbons(30), out, settings);
+  ASSERT_TRUE(baked) << baked.error().message;
+  const auto manifest = read_manifest(out);
+  ASSERT_TRUE(manifest);
+  ASSERT_GE(manifest->levels.size(), 2u);
+  EXPECT_EQ(manifest->levels[0].placements, 30u);
+  EXPECT_EQ(manifest->levels[1].placements, 0u);
+  EXPECT_FALSE(manifest->levels[1].morph);
+  EXPECT_GT(manifest->levels[1].voxels + manifest->levels[1].triangles, 0u);
+  EXPECT_TRUE(verify_and_measure_asset(out).findings.empty());
+  EXPECT_TRUE(bake_meshes(ribbons(30), out, settings)->is_up_to_date);
+}
+
+TEST(BakeApiParts, SubdividedMeshesHaveEachPlaceForItself) {
+  const test::TemporaryFolder folder;
+  const std::string out = (folder.path() / "ribbons.farfield").string();
+  BakeSettings settings = source_only();
+  settings.subdivision.scheme = BakeSubdivision::Scheme::CatmullClark;
+  const auto baked = bake_meshes(ribbons(30), out, settings);
+  ASSERT_TRUE(baked) << baked.error().message;
+  EXPECT_EQ(read_manifest(out)->levels[0].placements, 0u);
+  EXPECT_GT(baked->levels[0].triangles, 30 * 200u);
 }
 
 TEST_F(BakeApiCage, AMeshMayHaveASchemeOfItsOwn) {

@@ -132,6 +132,13 @@ Manifest textured_manifest() {
   return manifest;
 }
 
+TEST(Manifest, PlacesOfPartsComeBackAndMayBeAbsent) {
+  Manifest manifest = sample_manifest();
+  EXPECT_EQ(manifest_to_json(manifest).find("placements"), std::string::npos);
+  manifest.levels[0].placements = 18150;
+  EXPECT_EQ(manifest_from_json(manifest_to_json(manifest), "test")->levels[0].placements, 18150u);
+}
+
 TEST(Manifest, CostsOfRaysComeBackAndMayBeAbsent) {
   Manifest manifest = sample_manifest();
   EXPECT_EQ(manifest_from_json(manifest_to_json(manifest), "test")->levels[0].ray_cost, 0.0);

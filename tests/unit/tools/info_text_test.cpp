@@ -63,6 +63,14 @@ TEST(InfoTable, SaysWhenNothingWasEvaluated) {
   EXPECT_NE(info_table("oak.farfield", manifest).find("not evaluated"), std::string::npos);
 }
 
+TEST(InfoTable, SaysHowOftenPartsStand) {
+  Manifest manifest = two_levels();
+  EXPECT_EQ(info_table("oak.farfield", manifest).find("places"), std::string::npos);
+  manifest.levels[0].placements = 18150;
+  EXPECT_NE(info_table("oak.farfield", manifest).find("stands in 18150 places"), std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(info_json("oak.farfield", manifest))["levels"][0]["placements"], 18150);
+}
+
 TEST(InfoTable, SaysWhatNoiseHidesInWords) {
   Manifest manifest = two_levels();
   manifest.levels[1].errors->color_error = ErrorSize::unknown(0.0, 0.0123);
