@@ -63,9 +63,7 @@ Result<void> check_options(const BakeOptions& options) {
 }
 
 /// One mesh of a file stands in one place, and of tiles cuts matter.
-bool may_have_parts(const BakeOptions& options) {
-  return options.import.mesh < 0 && !options.import.tile.is_part();
-}
+bool may_have_parts(const BakeOptions& options) { return options.import.mesh < 0 && !options.import.tile.is_part(); }
 
 /// Equal text and source hash give equal bytes.
 std::string canonical_options(const BakeOptions& options, bool is_volume) {

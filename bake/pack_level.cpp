@@ -301,7 +301,8 @@ Box3 stored_bounds(const SparseVolume& volume, const VoxelBrick& brick) {
 
 SurfaceOrder order_surface(const Surface& surface, std::span<const uint32_t> part) {
   std::vector<Pair> pairs = Pairing(surface).run();
-  sort_along_curve(surface, [&](uint32_t face) { return part.empty() ? 0 : part[face]; }, pairs);
+  sort_along_curve(
+      surface, [&](uint32_t face) { return part.empty() ? 0 : part[face]; }, pairs);
 
   SurfaceOrder order;
   order.quads.reserve(pairs.size());

@@ -23,8 +23,8 @@ struct SurfaceOrder {
 
 /// Pairs and orders: first the halves of the surface's own quads. Two triangles become a quad when they share an edge
 /// and have the same winding; their shared edge is the quad's diagonal v1-v3, so that the quad is exactly the two
-/// triangles. Depends only on the surface. part: empty, or per triangle a number; those of a part share no vertices with
-/// others and stay together, parts in ascending order.
+/// triangles. Depends only on the surface. part: empty, or per triangle a number; those of a part share no vertices
+/// with others and stay together, parts in ascending order.
 SurfaceOrder order_surface(const Surface& surface, std::span<const uint32_t> part = {});
 
 /// The surface with vertices (without unused ones) and triangles in their final order. Corners of a triangle may be

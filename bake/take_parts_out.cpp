@@ -14,7 +14,7 @@ namespace {
 using Triangles = std::vector<uint32_t>;
 
 /// A mesh and the triangles of its places that are there.
-struct Candidate {
+struct RepeatedMesh {
   std::vector<uint32_t> places;  ///< indices into SourceSurface::placements
   std::vector<Triangles> triangles;
 };
@@ -27,7 +27,7 @@ mat4x3 surface_to_part(const glm::dmat4x3& to_surface) {
 /// Whether a part takes at most a quarter of what its triangles would take in all places: rays pay for each place that
 /// they pass. Level 0 of an oak takes 60 bytes a triangle, a place Embree's 104 bytes beside its own, a part a scene.
 bool pays(size_t places, size_t triangles) {
-  constexpr size_t kPerTriangle = 60, kPerPlace = sizeof(Placement) + 104, kPerPart = 4096;
+  constexpr size_t kPerTriangle = 60, kPerPlace = sizeof(PartPlacement) + 104, kPerPart = 4096;
   return 4 * (kPerPlace * places + kPerTriangle * triangles + kPerPart) <= kPerTriangle * places * triangles;
 }
 
@@ -42,30 +42,30 @@ bool are_alike(const SourceSurface& source, const Triangles& first, const Triang
   return true;
 }
 
-bool is_part(const SourceSurface& source, const Candidate& candidate) {
-  const auto& triangles = candidate.triangles;
+bool is_part(const SourceSurface& source, const RepeatedMesh& repeated) {
+  const auto& triangles = repeated.triangles;
   if (triangles.size() < 2 || !pays(triangles.size(), triangles[0].size())) return false;
   const auto has_inverse = [&](uint32_t place) {
     return can_be_undone(surface_to_part(source.placements[place].to_surface));
   };
-  return std::ranges::all_of(candidate.places, has_inverse) &&
+  return std::ranges::all_of(repeated.places, has_inverse) &&
          std::ranges::all_of(triangles, [&](const Triangles& other) { return are_alike(source, triangles[0], other); });
 }
 
 /// By the meshes' numbers.
-std::map<uint32_t, Candidate> candidates_of(const SourceSurface& source) {
+std::map<uint32_t, RepeatedMesh> repeated_meshes(const SourceSurface& source) {
   std::vector<Triangles> triangles(source.placements.size());
   for (uint32_t t = 0; t < source.triangles.size(); ++t) {
     if (source.placement[t] != kNoIndex) triangles[source.placement[t]].push_back(t);
   }
-  std::map<uint32_t, Candidate> candidates;
+  std::map<uint32_t, RepeatedMesh> meshes;
   for (uint32_t place = 0; place < triangles.size(); ++place) {
     if (triangles[place].empty()) continue;  // all of it has collapsed
-    Candidate& candidate = candidates[source.placements[place].mesh];
-    candidate.places.push_back(place);
-    candidate.triangles.push_back(std::move(triangles[place]));
+    RepeatedMesh& repeated = meshes[source.placements[place].mesh];
+    repeated.places.push_back(place);
+    repeated.triangles.push_back(std::move(triangles[place]));
   }
-  return candidates;
+  return meshes;
 }
 
 /// Puts triangles of the source together anew.
@@ -122,13 +122,13 @@ class PartedBuilder {
 
 std::optional<PartedSource> take_parts_out(const SourceSurface& source) {
   if (source.placements.empty() || source.material_function) return std::nullopt;
-  auto candidates = candidates_of(source);
-  std::erase_if(candidates, [&](const auto& candidate) { return !is_part(source, candidate.second); });
-  if (candidates.empty()) return std::nullopt;
+  auto meshes = repeated_meshes(source);
+  std::erase_if(meshes, [&](const auto& repeated) { return !is_part(source, repeated.second); });
+  if (meshes.empty()) return std::nullopt;
 
   std::vector<uint8_t> is_placed(source.triangles.size());
-  for (const auto& [mesh, candidate] : candidates) {
-    for (const Triangles& triangles : candidate.triangles) {
+  for (const auto& [mesh, repeated] : meshes) {
+    for (const Triangles& triangles : repeated.triangles) {
       for (const uint32_t t : triangles) is_placed[t] = 1;
     }
   }
@@ -139,14 +139,14 @@ std::optional<PartedSource> take_parts_out(const SourceSurface& source) {
   PartedBuilder builder(source);
   builder.add(own, 0, glm::dmat4x3(1.0), glm::dmat3(1.0));
   uint32_t part = 0;
-  for (const auto& [mesh, candidate] : candidates) {
-    const glm::dmat4x3& to_surface = source.placements[candidate.places[0]].to_surface;
+  for (const auto& [mesh, repeated] : meshes) {
+    const glm::dmat4x3& to_surface = source.placements[repeated.places[0]].to_surface;
     const glm::dmat3 linear(to_surface[0], to_surface[1], to_surface[2]);
-    const uint32_t first_face = source.source_face[candidate.triangles[0][0]];
-    builder.add(candidate.triangles[0], part + 1, surface_to_part(to_surface), glm::transpose(linear));
-    for (size_t i = 0; i < candidate.places.size(); ++i) {
-      builder.out().places.push_back({surface_to_part(source.placements[candidate.places[i]].to_surface), part,
-                                      source.source_face[candidate.triangles[i][0]] - first_face});
+    const uint32_t first_face = source.source_face[repeated.triangles[0][0]];
+    builder.add(repeated.triangles[0], part + 1, surface_to_part(to_surface), glm::transpose(linear));
+    for (size_t i = 0; i < repeated.places.size(); ++i) {
+      builder.out().places.push_back({surface_to_part(source.placements[repeated.places[i]].to_surface), part,
+                                      source.source_face[repeated.triangles[i][0]] - first_face});
     }
     ++part;
   }

@@ -13,9 +13,9 @@
 namespace farfield {
 
 struct PartedSource {
-  SourceSurface surface;          ///< what stands once, then each part in a space of its own; they share no vertices
-  std::vector<uint32_t> part;     ///< per triangle, ascending: 0 for what stands once, p + 1 for part p
-  std::vector<Placement> places;  ///< of the parts, part by part
+  SourceSurface surface;       ///< what stands once, then each part in a space of its own; they share no vertices
+  std::vector<uint32_t> part;  ///< per triangle, ascending: 0 for what stands once, p + 1 for part p
+  std::vector<PartPlacement> places;  ///< of the parts, part by part
 };
 
 /// Parts are what a source's placements repeat, if that takes a quarter: many places of many triangles.

@@ -144,9 +144,10 @@ inline unsigned attach_geometry(EmbreeSceneRef scene, EmbreeGeometryRef geometry
 inline void detach_geometry(EmbreeSceneRef scene, unsigned id) { rtcDetachGeometry(scene, id); }
 
 /// A committed scene of medium quality of these geometries (committed here), with their places, counted from first_id,
-/// as ids and no mask; null ones are left out. Built on the calling thread alone: a parallel build may order primitives differently, and with
-/// them the bytes that it takes and which of two equal hits is reported; and a thread that waits in here must not run a
-/// foreign task. cancel: polled meanwhile; once true, Embree ends with an error, and the scene is of no use.
+/// as ids and no mask; null ones are left out. Built on the calling thread alone: a parallel build may order primitives
+/// differently, and with them the bytes that it takes and which of two equal hits is reported; and a thread that waits
+/// in here must not run a foreign task. cancel: polled meanwhile; once true, Embree ends with an error, and the scene
+/// is of no use.
 EmbreeScene build_static_scene(EmbreeDeviceRef device, std::span<const EmbreeGeometry> geometries,
                                const std::atomic<bool>* cancel = nullptr, unsigned first_id = 0);
 inline EmbreeScene build_static_scene(EmbreeDeviceRef device, const EmbreeGeometry& geometry) {

@@ -56,11 +56,11 @@ Result<InstanceRecord> make_instance(uint32_t asset, const mat4x3& local_to_worl
   return record;
 }
 
-InstanceRecord placed(const InstanceRecord& instance, const Placement& placement) {
+InstanceRecord placed(const InstanceRecord& instance, const PartPlacement& placement) {
   const glm::dmat3 outer = linear_part(instance.world_to_local), inner = linear_part(placement.level_to_part);
   InstanceRecord result = instance;
-  result.set_inverse(inner * outer, inner * glm::dvec3(instance.world_to_local[3]) +
-                                        glm::dvec3(placement.level_to_part[3]));
+  result.set_inverse(inner * outer,
+                     inner * glm::dvec3(instance.world_to_local[3]) + glm::dvec3(placement.level_to_part[3]));
   return result;
 }
 

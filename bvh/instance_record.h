@@ -40,7 +40,7 @@ static_assert(sizeof(InstanceRecord) == 64);
 /// An instance of `asset`, footprint not set. Errors: InvalidArgument (not finite, not invertible in float).
 Result<InstanceRecord> make_instance(uint32_t asset, const mat4x3& local_to_world);
 /// The same as an instance of what stands at a place of its asset's level: its local space is the part's.
-InstanceRecord placed(const InstanceRecord& instance, const Placement& placement);
+InstanceRecord placed(const InstanceRecord& instance, const PartPlacement& placement);
 /// The largest factor by which the transform stretches a length: what instance scales mean for footprints, so that
 /// an instance that is squeezed along one axis keeps the detail along the others.
 float largest_stretch(const mat4x3& local_to_world);

@@ -24,7 +24,7 @@ std::vector<vec3> points_of(const LevelView& level, uint32_t part) {
 }
 
 /// Of all points: by its box alone a turned twig would be met by twice the rays (docs/decisions/0039).
-Box3 bounds_of(const Placement& placement, const std::vector<vec3>& points) {
+Box3 bounds_of(const PartPlacement& placement, const std::vector<vec3>& points) {
   const glm::dmat4x3 transform = to_level(placement);
   Box3 bounds;
   for (const vec3& p : points) bounds.extend(vec3(transform * glm::dvec4(p, 1.0)));
@@ -86,7 +86,7 @@ EmbreeGeometry PartScenes::make_geometry(EmbreeDeviceRef device) const {
 
 void PartScenes::bounds_callback(const RTCBoundsFunctionArguments* args) {
   const auto& self = *static_cast<const PartScenes*>(args->geometryUserPtr);
-  const Placement& placement = self.placements_[args->primID];
+  const PartPlacement& placement = self.placements_[args->primID];
   const Box3 bounds = bounds_of(placement, self.points_[placement.part]);
   args->bounds_o->lower_x = bounds.lower.x, args->bounds_o->upper_x = bounds.upper.x;
   args->bounds_o->lower_y = bounds.lower.y, args->bounds_o->upper_y = bounds.upper.y;
@@ -96,7 +96,7 @@ void PartScenes::bounds_callback(const RTCBoundsFunctionArguments* args) {
 void PartScenes::intersect_callback(const RTCIntersectFunctionNArguments* args) {
   if (args->valid[0] == 0) return;
   const auto& self = *static_cast<const PartScenes*>(args->geometryUserPtr);
-  const Placement& placement = self.placements_[args->primID];
+  const PartPlacement& placement = self.placements_[args->primID];
   auto& ray_hit = *reinterpret_cast<EmbreeRayHit*>(args->rayhit);
   const RayLanes ray = RayLanes::of(ray_hit.ray).transformed(placement.level_to_part);
   if (!is_traceable(ray.origin, ray.direction)) return;
@@ -112,7 +112,7 @@ void PartScenes::intersect_callback(const RTCIntersectFunctionNArguments* args) 
 void PartScenes::occluded_callback(const RTCOccludedFunctionNArguments* args) {
   if (args->valid[0] == 0) return;
   const auto& self = *static_cast<const PartScenes*>(args->geometryUserPtr);
-  const Placement& placement = self.placements_[args->primID];
+  const PartPlacement& placement = self.placements_[args->primID];
   auto& occluded = *reinterpret_cast<EmbreeRay*>(args->ray);
   const RayLanes ray = RayLanes::of(occluded).transformed(placement.level_to_part);
   if (!is_traceable(ray.origin, ray.direction)) return;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of a level (Placement) as rays see them: a scene for each part, and within the level's own scene one user
-// geometry with a primitive for each place. Embree's own instances would take 300 bytes more each, and Debian's Embree
-// has one level of them, which is the host's.
+// The parts of a level (PartPlacement) as rays see them: a scene for each part, and within the level's own scene one
+// user geometry with a primitive for each place. Embree's own instances would take 300 bytes more each, and Debian's
+// Embree has one level of them, which is the host's.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ class PartScenes {
   static void intersect_callback(const RTCIntersectFunctionNArguments* args);
   static void occluded_callback(const RTCOccludedFunctionNArguments* args);
 
-  ArrayView<Placement> placements_;
+  ArrayView<PartPlacement> placements_;
   std::vector<EmbreeScene> scenes_;        ///< per part
   std::vector<std::vector<vec3>> points_;  ///< per part: its vertices, until forget_points()
   uint64_t bytes_ = 0, point_bytes_ = 0, most_held_bytes_ = 0;

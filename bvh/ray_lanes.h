@@ -16,7 +16,8 @@ struct RayLanes {
 
   static RayLanes of(const EmbreeRay& ray) { return {load4(&ray.org_x), load4(&ray.dir_x)}; }
   void store_to(EmbreeRay& ray) const { store4(&ray.org_x, origin), store4(&ray.dir_x, direction); }
-  /// By a matrix as transform_vector() wants it. The direction keeps its length's meaning: t is the same in both spaces.
+  /// By a matrix as transform_vector() wants it. The direction keeps its length's meaning: t is the same in both
+  /// spaces.
   RayLanes transformed(const mat4x3& matrix) const {
     return {with_w_of(transform_point(matrix, origin), origin),
             with_w_of(transform_vector(matrix, direction), direction)};

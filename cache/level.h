@@ -116,12 +116,12 @@ Box3 active_box(const Brick& brick);
 
 /// Where a part of a level's surface stands. Parts are what a source shows many times (the leaves of a tree): a level 0
 /// may have the quads of each once, in a space of their own, and any number of places for it.
-struct Placement {
+struct PartPlacement {
   mat4x3 level_to_part{1.0f};  ///< from the level's space to the part's; invertible
   uint32_t part = 0;
   uint32_t source_face_offset = 0;  ///< added to the numbers that source_face has, which are those of the first place
 };
-static_assert(sizeof(Placement) == 56);
+static_assert(sizeof(PartPlacement) == 56);
 
 /// Where a morph map sends things of level k-1 (thesis 8.1.2, 10.1.2).
 inline constexpr uint32_t kMorphVoxelized = 0xffffffffu;  ///< it became part of the volume of level k: fades out
@@ -218,7 +218,7 @@ inline size_t brick_table_index(const ivec3& dims, const ivec3& brick) {
   ARRAY(32, FaceSheetShape,     face_sheet_shape,     PackedSheetShape,  Faces)         /* no sheet */ \
   /* level 0: what stands in many places. Quads before the first part's stand in the level's own space */              \
   ARRAY(33, PartFirstQuad,      part_first_quad,      uint32_t,          Parts)         /* each part ends at the next */ \
-  ARRAY(34, Placements,         placements,           Placement,         Placements)
+  ARRAY(34, Placements,         placements,           PartPlacement,         Placements)
 // clang-format on
 
 /// The arrays, owned (Array = std::vector<T>) while baking, or as spans into a file in memory at run time.

@@ -138,7 +138,7 @@ Problem check_placements(const LevelView& level) {
   constexpr uint64_t kMostPlacedQuads = uint64_t{1} << 28;
   uint64_t placed = 0;
   for (size_t i = 0; i < level.placements.size(); ++i) {
-    const Placement& placement = level.placements[i];
+    const PartPlacement& placement = level.placements[i];
     if (placement.part >= level.part_first_quad.size()) {
       return fmt::format("placements[{}] is of part {}, and there are {}", i, placement.part,
                          level.part_first_quad.size());

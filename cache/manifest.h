@@ -48,9 +48,9 @@ struct LevelEntry {
   uint32_t grid = 0;      ///< longest side of the bounds / r_k, rounded
   std::string file;       ///< name inside the asset's folder
   uint64_t file_bytes = 0;
-  uint64_t file_hash = 0;  ///< XXH3 of the whole file
-  uint64_t triangles = 0;  ///< those of parts once, in however many places they stand
-  uint64_t placements = 0;  ///< of parts (Placement)
+  uint64_t file_hash = 0;   ///< XXH3 of the whole file
+  uint64_t triangles = 0;   ///< those of parts once, in however many places they stand
+  uint64_t placements = 0;  ///< of parts (PartPlacement)
   uint64_t voxels = 0;
   uint64_t bricks = 0;
   uint64_t resident_bytes = 0;     ///< bytes of the file that stay, plus BVH, once loaded

@@ -49,13 +49,14 @@ class Flattener {
   explicit Flattener(const LevelView& level)
       : level_(level),
         vertices_(level.positions.size()),
-        shading_vertices_(std::max({level.shading_normal.size(), level.shading_uv.size(), level.shading_color.size()})) {
+        shading_vertices_(
+            std::max({level.shading_normal.size(), level.shading_uv.size(), level.shading_color.size()})) {
     flat_.header = level.header;
   }
 
   LevelData run() {
     add(0, level_.own_quad_count(), glm::dmat4x3(1.0), glm::dmat3(1.0), 0);
-    for (const Placement& placement : level_.placements) {
+    for (const PartPlacement& placement : level_.placements) {
       const auto [first, end] = level_.part_quads(placement.part);
       add(first, end, to_level(placement), glm::transpose(linear_part(placement.level_to_part)),
           placement.source_face_offset);
@@ -89,7 +90,7 @@ class Flattener {
 
   void add_face(uint32_t face, const glm::dmat3& of_normals, uint32_t source_face_offset) {
     ++faces_;
-#define FARFIELD_COPY(id, Name, field, Element, Group)                                                       \
+#define FARFIELD_COPY(id, Name, field, Element, Group) \
   if (SectionGroup::Group == SectionGroup::Faces && !level_.field.empty()) flat_.field.push_back(level_.field[face]);
     FARFIELD_LEVEL_ARRAYS(FARFIELD_COPY)
 #undef FARFIELD_COPY
@@ -124,7 +125,7 @@ bool can_be_undone(const mat4x3& transform) {
          is_in_range(to_level({transform, 0, 0}));
 }
 
-glm::dmat4x3 to_level(const Placement& placement) {
+glm::dmat4x3 to_level(const PartPlacement& placement) {
   const glm::dmat3 linear = glm::inverse(linear_part(placement.level_to_part));
   return {linear[0], linear[1], linear[2], -(linear * glm::dvec3(placement.level_to_part[3]))};
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of a level's surface (Placement) in the level's own space.
+// The parts of a level's surface (PartPlacement) in the level's own space.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace farfield {
 /// Whether a transform is finite and has an inverse that is, within what rays can be traced in.
 bool can_be_undone(const mat4x3& transform);
 /// From the part's space to the level's, of a transform that can_be_undone().
-glm::dmat4x3 to_level(const Placement& placement);
+glm::dmat4x3 to_level(const PartPlacement& placement);
 
 /// The vertices of a part, each once.
 std::vector<uint32_t> part_vertices(const LevelView& level, uint32_t part);
@@ -30,7 +30,7 @@ void for_each_surface_point(const LevelView& level, Visit&& visit) {
   }
   std::vector<std::vector<uint32_t>> vertices;
   for (uint32_t part = 0; part < level.part_first_quad.size(); ++part) vertices.push_back(part_vertices(level, part));
-  for (const Placement& placement : level.placements) {
+  for (const PartPlacement& placement : level.placements) {
     const glm::dmat4x3 transform = to_level(placement);
     for (const uint32_t v : vertices[placement.part]) visit(vec3(transform * glm::dvec4(level.positions[v], 1.0)));
   }

@@ -90,7 +90,8 @@ std::string info_table(const std::string& name, const Manifest& manifest) {
   text += format_table(rows);
   for (const LevelEntry& level : manifest.levels) {
     if (level.placements == 0) continue;
-    text += fmt::format("level {}: what it repeats counts once, and stands in {} places\n", level.level, level.placements);
+    text +=
+        fmt::format("level {}: what it repeats counts once, and stands in {} places\n", level.level, level.placements);
   }
   if (std::none_of(manifest.levels.begin(), manifest.levels.end(), [](const auto& level) { return level.errors; }))
     text += "errors: not evaluated yet, see farfield evaluate --help\n";

@@ -72,7 +72,7 @@ TEST(TakePartsOut, WhatIsRepeatedIsThereOnceAndStandsWhereItStood) {
   EXPECT_EQ(surface.material[10], 0u);
   ASSERT_EQ(parted->places.size(), 20u);
   for (size_t i = 0; i < parted->places.size(); ++i) {
-    const Placement& placement = parted->places[i];
+    const PartPlacement& placement = parted->places[i];
     EXPECT_EQ(placement.part, 0u);
     const glm::dmat4x3 transform = to_level(placement);
     const glm::dmat3 of_normals = glm::transpose(glm::inverse(glm::dmat3(transform[0], transform[1], transform[2])));

@@ -411,7 +411,8 @@ BakeInput ribbons(int places) {
     std::vector<uint32_t> corners, counts;
     for (int i = 0; i <= quads; ++i) {
       const float angle = 0.1f * static_cast<float>(i);
-      for (const float z : {0.0f, 0.2f}) points.emplace_back(std::cos(angle), 0.01f * static_cast<float>(i), z + std::sin(angle));
+      for (const float z : {0.0f, 0.2f})
+        points.emplace_back(std::cos(angle), 0.01f * static_cast<float>(i), z + std::sin(angle));
     }
     for (uint32_t i = 0; i < static_cast<uint32_t>(quads); ++i) {
       corners.insert(corners.end(), {2 * i, 2 * i + 1, 2 * i + 3, 2 * i + 2});
@@ -425,8 +426,8 @@ BakeInput ribbons(int places) {
   input.instances = {{1, glm::dmat4x3(1.0)}};
   for (int i = 0; i < places; ++i) {
     const double angle = i, scale = i % 3 == 2 ? -0.5 : 1.0;
-    const glm::dmat4x3 place(scale * std::cos(angle), scale * std::sin(angle), 0, -std::sin(angle), std::cos(angle), 0, 0,
-                             0, 1, 3 * (i % 5), 3 * (i / 5), i);
+    const glm::dmat4x3 place(scale * std::cos(angle), scale * std::sin(angle), 0, -std::sin(angle), std::cos(angle), 0,
+                             0, 0, 1, 3 * (i % 5), 3 * (i / 5), i);
     input.instances.push_back({0, place});
   }
   return input;

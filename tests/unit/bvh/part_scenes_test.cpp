@@ -26,11 +26,11 @@ LevelData soup_with_parts(uint32_t places, uint64_t seed) {
   level.part_first_quad = {quads / 2, 3 * quads / 4};
   Rng rng(seed);
   for (uint32_t i = 0; i < places; ++i) {
-    Placement placement;
+    PartPlacement placement;
     do {
       for (int c = 0; c < 3; ++c) placement.level_to_part[c] = (0.3f + 2.0f * rng.next()) * random_unit(rng);
-    } while (std::abs(glm::determinant(mat3(placement.level_to_part[0], placement.level_to_part[1],
-                                            placement.level_to_part[2]))) < 0.05f);
+    } while (std::abs(glm::determinant(
+                 mat3(placement.level_to_part[0], placement.level_to_part[1], placement.level_to_part[2]))) < 0.05f);
     placement.level_to_part[3] = 2.0f * random_unit(rng);
     placement.part = i % 2;
     level.placements.push_back(placement);
@@ -58,7 +58,7 @@ TEST(PartScenes, RaysMeetPartsWhereTheyStand) {
   // Faces of the flat level, place by place.
   std::vector<uint32_t> first_quad_of_place;
   uint32_t quad = view_of(parted).own_quad_count();
-  for (const Placement& placement : parted.placements) {
+  for (const PartPlacement& placement : parted.placements) {
     first_quad_of_place.push_back(quad);
     const auto [first, end] = view_of(parted).part_quads(placement.part);
     quad += end - first;
@@ -87,7 +87,7 @@ TEST(PartScenes, RaysMeetPartsWhereTheyStand) {
       ++hits_on_parts;
       const uint32_t place = in_parts.hit.instID[0];
       ASSERT_LT(place, parted.placements.size());
-      const Placement& placement = parted.placements[place];
+      const PartPlacement& placement = parted.placements[place];
       ASSERT_EQ(placement.part + 1, in_parts.hit.geomID);
       found += first_quad_of_place[place] - parted.part_first_quad[placement.part];
       const mat4x3& m = placement.level_to_part;
@@ -149,7 +149,7 @@ TEST(PartScenes, PlacesOfAnySizeAreTraceableOrPassedBy) {
   LevelData level = triangle_soup(8, 0.5f, 3);
   level.part_first_quad = {0};
   for (const float scale : {1e-9f, 1e-3f, 1.0f, 1e9f}) {
-    Placement placement;
+    PartPlacement placement;
     placement.level_to_part = mat4x3(scale);
     level.placements.push_back(placement);
   }

@@ -241,23 +241,34 @@ TEST(LevelFormat, PlacesOfPartsAreChecked) {
   };
   EXPECT_EQ(problem([](LevelData&) {}), "");
   EXPECT_EQ(problem([](LevelData& l) { l.placements.clear(); }), "part_first_quad and placements do not go together");
-  EXPECT_EQ(problem([](LevelData& l) { l.part_first_quad.clear(); }), "part_first_quad and placements do not go together");
+  EXPECT_EQ(problem([](LevelData& l) { l.part_first_quad.clear(); }),
+            "part_first_quad and placements do not go together");
   EXPECT_EQ(problem([](LevelData& l) { l.part_first_quad = {2}; }),
             "part_first_quad[0] is 2 of 2 quads, and parts are not empty");
-  EXPECT_EQ(problem([](LevelData& l) { l.part_first_quad = {1, 1}; }),
+  EXPECT_EQ(problem([](LevelData& l) {
+              l.part_first_quad = {1, 1};
+            }),
             "part_first_quad[1] is 1 of 2 quads, and parts are not empty");
   EXPECT_EQ(problem([](LevelData& l) { l.placements[1].part = 1; }), "placements[1] is of part 1, and there are 1");
   EXPECT_EQ(problem([](LevelData& l) { l.placements[0].level_to_part[2] = vec3(0); }), "placements[0] has no inverse");
   EXPECT_EQ(problem([](LevelData& l) { l.placements[0].level_to_part[3].x = NAN; }), "placements[0] has no inverse");
   EXPECT_EQ(problem([](LevelData& l) { l.placements[0].level_to_part[3].x = 1e19f; }), "placements[0] has no inverse");
-  EXPECT_EQ(problem([](LevelData& l) { l.placements[0].level_to_part = mat4x3(1e-30f); }), "placements[0] has no inverse");
-  EXPECT_EQ(problem([](LevelData& l) { l.face_gap.resize(3); }), "it has parts, and faces that are not those of a source");
+  EXPECT_EQ(problem([](LevelData& l) { l.placements[0].level_to_part = mat4x3(1e-30f); }),
+            "placements[0] has no inverse");
+  EXPECT_EQ(problem([](LevelData& l) { l.face_gap.resize(3); }),
+            "it has parts, and faces that are not those of a source");
   // A part's own space is not the level's.
-  EXPECT_EQ(problem([](LevelData& l) { l.positions[3] = vec3(-1e9f); l.quads = {{0, 1, 0, 2}, {3, 3, 3, 3}}; }),
+  EXPECT_EQ(problem([](LevelData& l) {
+              l.positions[3] = vec3(-1e9f);
+              l.quads = {{0, 1, 0, 2}, {3, 3, 3, 3}};
+            }),
             "");
   EXPECT_EQ(problem([](LevelData& l) { l.positions[1] = vec3(1e9f); }),
             "positions[1] = (1000000000, 1000000000, 1000000000) is not inside the bounds");
-  EXPECT_EQ(problem([](LevelData& l) { l.positions[3] = vec3(NAN); l.quads = {{0, 1, 0, 2}, {3, 3, 3, 3}}; }),
+  EXPECT_EQ(problem([](LevelData& l) {
+              l.positions[3] = vec3(NAN);
+              l.quads = {{0, 1, 0, 2}, {3, 3, 3, 3}};
+            }),
             "positions[3] = (nan, nan, nan) is not inside the bounds");
 }
 

@@ -1033,7 +1033,7 @@ std::vector<LevelData> spheres_in_places() {
   for (const vec3& p : once.positions) level.shading_normal.push_back(pack_normal(glm::normalize(p)));
   level.part_first_quad = {count};
   level.placements = {{mat4x3(1, 0, 0, 0, 1, 0, 0, 0, 1, -3, 0, 0), 0, 0},
-                      {mat4x3(0, 2, 0, -1, 0, 0, 0, 0, 1, 0, 4, 0), 0, 1000},     // squeezed
+                      {mat4x3(0, 2, 0, -1, 0, 0, 0, 0, 1, 0, 4, 0), 0, 1000},   // squeezed
                       {mat4x3(-1, 0, 0, 0, 1, 0, 0, 0, 1, 3, 0, 3), 0, 2000}};  // mirrored
   level.header.bounds = {vec3(-4, -4, -4), vec3(5, 4, 4)};
   set_diffuse(level, vec3(1));
@@ -1058,7 +1058,8 @@ TEST_F(RuntimeTest, InteractionsOnPartsAreThoseOfTheFlatLevel) {
   std::set<uint32_t> places;
   int hits = 0, different = 0;
   for (int i = 0; i < 4000; ++i) {
-    const vec3 target = transform * vec4(4.0f * test::random_unit(rng), 1), origin = target + 20.0f * test::random_unit(rng);
+    const vec3 target = transform * vec4(4.0f * test::random_unit(rng), 1),
+               origin = target + 20.0f * test::random_unit(rng);
     RayContext context, flat_context;
     EmbreeRayHit hit, flat_hit;
     const vec3 direction = glm::normalize(transform * vec4(0, 0, 0, 1) - origin);
