@@ -61,7 +61,8 @@ Manifest write_asset(const std::filesystem::path& folder, const std::vector<Leve
     LevelEntry& entry = manifest.levels.emplace_back();
     entry.grid = 1;
     write_entry(folder, level, measure, entry, manifest.bounds);
-    if (measure_morph && &level != &levels[0]) entry.morph = measure_morph(view_of(*(&level - 1)), view_of(level));
+    const bool may_morph = &level != &levels[0] && !(&level - 1)->has_parts();
+    if (measure_morph && may_morph) entry.morph = measure_morph(view_of(*(&level - 1)), view_of(level));
   }
   or_stop(write_manifest(folder, manifest));
   return manifest;

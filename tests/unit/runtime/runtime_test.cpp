@@ -1070,8 +1070,10 @@ TEST_F(RuntimeTest, InteractionsOnPartsAreThoseOfTheFlatLevel) {
     places.insert(context.hit.placement);
     const Interaction a = parts.interaction(hit, context), b = flat.interaction(flat_hit, flat_context);
     EXPECT_NEAR(hit.ray.tfar, flat_hit.ray.tfar, 1e-4f);
+    // Between its corners, a squeezed part's normals are squeezed after they are interpolated.
+    const float tolerance = context.hit.placement == 1 ? 1.5e-2f : 2e-3f;
     const bool is_same = glm::length(a.geometric_normal - b.geometric_normal) < 1e-4f &&
-                         glm::length(a.shading_normal - b.shading_normal) < 2e-3f && a.source_face == b.source_face;
+                         glm::length(a.shading_normal - b.shading_normal) < tolerance && a.source_face == b.source_face;
     different += !is_same;
     EXPECT_NEAR(a.albedo.y, b.albedo.y, 1e-6f);
     // Nothing hides the hit from itself.
