@@ -447,15 +447,19 @@ struct Ribbons {
   }
 };
 
-/// Sums over all corners of a flat level's quads: of 1, x, y, z and of their products.
+/// Sums over the corners of a flat level's faces: of 1, x, y, z and of their products.
 std::array<double, 10> moments_of(const LevelData& level) {
   std::array<double, 10> sums{};
-  for (const Quad& quad : level.quads) {
-    for (const uint32_t v : {quad.v0, quad.v1, quad.v2, quad.v3}) {
-      const glm::dvec3 p(level.positions[v]);
+  const auto add = [&](const uvec3& face) {
+    for (int k = 0; k < 3; ++k) {
+      const glm::dvec3 p(level.positions[face[k]]);
       const double terms[] = {1, p.x, p.y, p.z, p.x * p.x, p.y * p.y, p.z * p.z, p.x * p.y, p.y * p.z, p.z * p.x};
       for (size_t i = 0; i < sums.size(); ++i) sums[i] += terms[i];
     }
+  };
+  for (const Quad& quad : level.quads) {
+    add(quad.face(0));
+    if (quad.is_pair()) add(quad.face(1));
   }
   return sums;
 }
