@@ -181,9 +181,11 @@ class Simplifier {
     mesh_.find_spokes(b, spokes_b_);
     if (kept_.empty() || !keeps_topology(a, b)) return false;
     fill_ring(a, b);
-    const std::optional<Placement> placement = find_placement(a, b);
-    if (!placement) return false;
-    commit(a, b, *placement);
+    const std::optional<dvec3> x = find_place(a, b);
+    if (!x || !keeps_edges_short(a, b, *x) || !keeps_faces(*x)) return false;
+    const double deviation = deviation_at(ring_, *x) + std::max(mesh_.deviation[a], mesh_.deviation[b]);
+    if (!(deviation <= kMaxDeviation * resolution_)) return false;
+    commit(a, b, *x, deviation);
     return true;
   }
 
@@ -289,29 +291,27 @@ class Simplifier {
     }
   }
 
-  /// Where the merged vertex goes, or nothing if no place keeps faces, edges and deviation within bounds.
-  std::optional<Placement> find_placement(uint32_t a, uint32_t b) const {
+  /// Where the merged vertex goes, or nothing if it has no place.
+  std::optional<dvec3> find_place(uint32_t a, uint32_t b) const {
     const dvec3 pa = mesh_.positions[a], pb = mesh_.positions[b];
     const double tolerance = kPlacementTolerance * resolution_;
-    const auto accept = [&](const Placement& placement) -> std::optional<Placement> {
-      return is_valid(a, b, placement) ? std::optional(placement) : std::nullopt;
-    };
-    if (is_pinned(a) || is_pinned(b))
-      return may_merge_into_pinned(a, b) ? accept(keep_vertex(ring_, is_pinned(a) ? pa : pb)) : std::nullopt;
+    if (is_pinned(a) || is_pinned(b)) {
+      return may_merge_into_pinned(a, b) ? std::optional(is_pinned(a) ? pa : pb) : std::nullopt;
+    }
     const auto optimum = [&] { return closest_position(ring_, 0.5 * (pa + pb), tolerance); };
     if (kind_a_ == VertexKind::Interior && kind_b_ == VertexKind::Interior) {
       const dvec3 x = optimum();
-      return accept(keep_vertex(ring_, chosen_between(x, with_same_volume(ring_, x))));
+      return chosen_between(x, with_same_volume(ring_, x));
     }
     if (kind_a_ == VertexKind::Curve && kind_b_ == VertexKind::Curve) {
       const dvec3 x = optimum();
       const dvec3 p = mesh_.positions[curve_neighbour(spokes_a_, b)],
                   q = mesh_.positions[curve_neighbour(spokes_b_, a)];
       const auto limit = with_same_border_area(p, pa, pb, q, x);
-      return limit ? accept(keep_vertex(ring_, chosen_between(x, *limit))) : std::nullopt;
+      return limit ? std::optional(chosen_between(x, *limit)) : std::nullopt;
     }
     const bool stays_at_a = kind_b_ == VertexKind::Interior || kind_a_ == VertexKind::Corner;
-    return accept(keep_vertex(ring_, stays_at_a ? pa : pb));
+    return stays_at_a ? pa : pb;
   }
 
   bool is_pinned(uint32_t vertex) const { return !mesh_.is_pinned.empty() && mesh_.is_pinned[vertex] != 0; }
@@ -343,33 +343,28 @@ class Simplifier {
     return kNoIndex;
   }
 
-  bool is_valid(uint32_t a, uint32_t b, const Placement& placement) const {
-    const double total_deviation = placement.deviation + std::max(mesh_.deviation[a], mesh_.deviation[b]);
-    if (!(total_deviation <= kMaxDeviation * resolution_)) return false;
-
-    // Where the source is coarser than that, edges may grow a little: a tube's ring could not merge otherwise.
+  /// Where the source is coarser than the limit, edges may grow a little: a tube's ring could not merge otherwise.
+  bool keeps_edges_short(uint32_t a, uint32_t b, const dvec3& x) const {
     const double edge = glm::length(mesh_.positions[b] - mesh_.positions[a]);
     const double limit = kLongEdge * resolution_;
     const double longest = longest_spoke_ > limit ? longest_spoke_ + 0.5 * edge : limit;
-    for (const dvec3& neighbour : ring_.neighbours_after) {
-      if (squared_length(neighbour - placement.position) > longest * longest) return false;
-    }
+    return std::ranges::none_of(ring_.neighbours_after, [&](const dvec3& neighbour) {
+      return squared_length(neighbour - x) > longest * longest;
+    });
+  }
+
+  bool keeps_faces(const dvec3& x) const {
     for (size_t i = 0; i < kept_.size(); ++i) {
-      if (!is_face_valid(i, placement.position)) return false;
+      const auto& [q, s] = ring_.after[i];
+      if (!keeps_face(ring_.before[i].corners, {x, q, s})) return false;  // corners in the same order, up to a rotation
     }
     return true;
   }
 
-  bool is_face_valid(size_t i, const dvec3& x) const {
-    const auto& [p0, p1, p2] = ring_.before[i];
-    const auto& [q, s] = ring_.after[i];
-    return keeps_face({p0, p1, p2}, {x, q, s});  // starts at the corner that moves, in the triangle's order
-  }
-
-  void commit(uint32_t a, uint32_t b, const Placement& placement) {
-    filter_ring_materials(placement.position);
-    mesh_.deviation[a] = placement.deviation + std::max(mesh_.deviation[a], mesh_.deviation[b]);
-    mesh_.positions[a] = placement.position;
+  void commit(uint32_t a, uint32_t b, const dvec3& x, double deviation) {
+    filter_ring_materials(x);
+    mesh_.deviation[a] = deviation;
+    mesh_.positions[a] = x;
     mesh_.merge(a, b, kept_, collapsing_);
   }
 
@@ -377,7 +372,7 @@ class Simplifier {
     area_before_.clear();
     area_after_.assign(ring_.before.size(), 0.0);
     ring_materials_.clear();
-    for (const auto& [p0, p1, p2] : ring_.before) area_before_.push_back(0.5 * glm::length(area_vector({p0, p1, p2})));
+    for (const BoundedTriangle& t : ring_.before) area_before_.push_back(0.5 * glm::length(area_vector(t.corners)));
     for (size_t i = 0; i < kept_.size(); ++i) {
       area_after_[i] = 0.5 * glm::length(area_vector({x, ring_.after[i][0], ring_.after[i][1]}));
     }

@@ -42,7 +42,7 @@ class LengthQueue {
   }
 
  private:
-  static constexpr size_t kEdgesPerPart = 512, kMostParts = 1 << 14;
+  static constexpr size_t kEdgesPerPart = 128, kMostParts = 1 << 14;
 
   std::vector<std::vector<Edge>> parts_;  ///< by length; the first is a heap
   double parts_per_length2_;
