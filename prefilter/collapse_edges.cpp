@@ -139,7 +139,8 @@ class Simplifier {
     }
     Candidate candidate;
     while (!job_.is_cancelled() && queue_.pop(candidate)) {
-      if (is_current(candidate) && try_collapse(candidate.a, candidate.b)) push_edges_at(candidate.a);
+      if (!is_current(candidate) || !try_collapse(candidate.a, candidate.b)) continue;
+      for (const uint32_t neighbour : neighbours_) push(candidate.a, neighbour);
     }
   }
 
@@ -162,11 +163,6 @@ class Simplifier {
     if (!(length2 < limit * limit)) return;
     const auto [a, b] = std::minmax(v, w);
     queue_.push({length2, a, b, mesh_.version[a], mesh_.version[b]});
-  }
-
-  void push_edges_at(uint32_t vertex) {
-    mesh_.find_spokes(vertex, spokes_a_);
-    for (const Spoke& spoke : spokes_a_) push(vertex, spoke.vertex);
   }
 
   bool is_current(const Candidate& candidate) const {
@@ -275,20 +271,22 @@ class Simplifier {
       ring_.after.push_back({position(q), position(s)});
     }
     ring_.samples_before = {position(a), position(b), 0.5 * (position(a) + position(b))};
-    longest_spoke_ = 0;
-    for (const Spoke& spoke : spokes_a_) {
-      if (spoke.vertex == b) continue;
-      longest_spoke_ = std::max(longest_spoke_, glm::length(position(spoke.vertex) - position(a)));
-      ring_.samples_before.push_back(0.5 * (position(a) + position(spoke.vertex)));
-      ring_.neighbours_after.push_back(position(spoke.vertex));
-    }
-    for (const Spoke& spoke : spokes_b_) {
-      if (spoke.vertex == a) continue;
-      longest_spoke_ = std::max(longest_spoke_, glm::length(position(spoke.vertex) - position(b)));
-      ring_.samples_before.push_back(0.5 * (position(b) + position(spoke.vertex)));
-      const bool is_common = std::binary_search(common_.begin(), common_.end(), spoke.vertex);
-      if (!is_common) ring_.neighbours_after.push_back(position(spoke.vertex));
-    }
+    // Topology is kept, so every vertex next to a or b has a face that stays, and is next to the merged vertex.
+    double longest2 = 0;
+    neighbours_.clear();
+    const auto add_spokes = [&](uint32_t vertex, const std::vector<Spoke>& spokes, uint32_t excluded) {
+      for (const Spoke& spoke : spokes) {
+        if (spoke.vertex == excluded) continue;
+        longest2 = std::max(longest2, squared_length(position(spoke.vertex) - position(vertex)));
+        ring_.samples_before.push_back(0.5 * (position(vertex) + position(spoke.vertex)));
+        const bool is_seen = vertex == b && std::binary_search(common_.begin(), common_.end(), spoke.vertex);
+        if (!is_seen) neighbours_.push_back(spoke.vertex);
+      }
+    };
+    add_spokes(a, spokes_a_, b);
+    add_spokes(b, spokes_b_, a);
+    longest_spoke_ = std::sqrt(longest2);
+    for (const uint32_t neighbour : neighbours_) ring_.neighbours_after.push_back(position(neighbour));
   }
 
   /// Where the merged vertex goes, or nothing if it has no place.
@@ -393,6 +391,7 @@ class Simplifier {
   std::vector<uint32_t> kept_, collapsing_, common_;
   size_t kept_of_a_ = 0;  ///< the first of kept_ are a's
   std::vector<Spoke> spokes_a_, spokes_b_;
+  std::vector<uint32_t> neighbours_;  ///< of the merged vertex
   VertexKind kind_a_{}, kind_b_{};
   CollapseRing ring_;         ///< its `before` and `after` follow kept_, then collapsing_
   double longest_spoke_ = 0;  ///< length of the longest edge at a or b, but for ab
@@ -408,6 +407,9 @@ bool is_all_fixed(const EdgeCollapseOptions& options, const SurfaceParts& parts,
 CollapsibleMesh extract_part(const Surface& surface, const EdgeCollapseOptions& options, const SurfaceParts& parts,
                              size_t part) {
   CollapsibleMesh mesh;
+  mesh.positions.reserve(parts.vertices_of(part).size());
+  mesh.triangles.reserve(parts.faces_of(part).size());
+  mesh.materials.reserve(parts.faces_of(part).size());
   for (const uint32_t vertex : parts.vertices_of(part)) mesh.positions.emplace_back(surface.positions[vertex]);
   for (const uint32_t face : parts.faces_of(part)) {
     const uvec3& t = surface.triangles[face];

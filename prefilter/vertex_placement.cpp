@@ -64,9 +64,12 @@ Nearest find_nearest(std::span<const BoundedTriangle> triangles, const dvec3& p,
     least2 = std::min(least2, distance2);
   }
   look_at(first);
+  double distance = std::sqrt(nearest.distance2);
   for (size_t i = 0; i < triangles.size() && nearest.distance2 > enough2; ++i) {
-    const double reach = std::sqrt(nearest.distance2) + triangles[i].radius;
-    if (i != first && !(squared_length(triangles[i].center - p) > reach * reach)) look_at(i);
+    const double reach = distance + triangles[i].radius;
+    if (i == first || squared_length(triangles[i].center - p) > reach * reach) continue;
+    look_at(i);
+    distance = std::sqrt(nearest.distance2);
   }
   return nearest;
 }

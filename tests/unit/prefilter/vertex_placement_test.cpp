@@ -53,6 +53,97 @@ double area_before(const CollapseRing& ring) {
   return area;
 }
 
+/// The largest distance, and what one step of closest_position() gives, by looking at every triangle.
+struct LookedAtAll {
+  double deviation = 0;
+  dvec3 next;
+};
+
+LookedAtAll look_at_all(const CollapseRing& ring, const dvec3& x) {
+  LookedAtAll result;
+  dvec3 moment(0.0);
+  double weight2 = 0;
+  const auto add = [&](double weight, const dvec3& rest, const dvec3& target) {
+    result.deviation = std::max(result.deviation, glm::length(weight * x + rest - target));
+    weight2 += weight * weight;
+    moment += weight * (target - rest);
+  };
+  const auto farther = [](const dvec3& p) {
+    return [p](const dvec3& l, const dvec3& r) { return squared(l - p) < squared(r - p); };
+  };
+  for (const dvec3& p : ring.samples_before) {
+    std::vector<dvec3> points, weights;
+    for (const auto& [q, s] : ring.after) {
+      weights.push_back(closest_barycentric(p, x, q, s));
+      points.push_back(weights.back().x * x + weights.back().y * q + weights.back().z * s);
+    }
+    const size_t i = static_cast<size_t>(std::ranges::min_element(points, farther(p)) - points.begin());
+    add(weights[i].x, weights[i].y * ring.after[i][0] + weights[i].z * ring.after[i][1], p);
+  }
+  const auto add_after = [&](double weight, const dvec3& rest) {
+    std::vector<dvec3> points;
+    for (const BoundedTriangle& t : ring.before) {
+      const auto& [a, b, c] = t.corners;
+      const dvec3 bary = closest_barycentric(weight * x + rest, a, b, c);
+      points.push_back(bary.x * a + bary.y * b + bary.z * c);
+    }
+    add(weight, rest, *std::ranges::min_element(points, farther(weight * x + rest)));
+  };
+  add_after(1.0, dvec3(0.0));
+  for (const dvec3& q : ring.neighbours_after) add_after(0.5, 0.5 * q);
+  result.next = moment / weight2;
+  return result;
+}
+
+TEST(VertexPlacement, FindsWhatLookingAtEveryTriangleFinds) {
+  std::mt19937 rng(4);
+  std::normal_distribution<double> normal;
+  for (int round = 0; round < 500; ++round) {
+    const double roughness = std::pow(10.0, -4.0 + round % 6);  // from nearly flat to a tangle
+    CollapseRing ring = grid_ring([&](double, double) { return roughness * normal(rng); });
+    if (round % 3 == 1) {  // slivers: the ring is squeezed to a line, or nearly
+      const double width = round % 2 == 0 ? 0.0 : 1e-7;
+      for (auto& t : ring.before) {
+        for (dvec3& p : t.corners) p.y *= width;
+        t = {t.corners[0], t.corners[1], t.corners[2]};
+      }
+      for (auto& t : ring.after) t[0].y *= width, t[1].y *= width;
+    }
+    if (round % 5 == 0) ring.after[1] = {ring.after[1][0], ring.after[1][0]};
+    const dvec3 x = dvec3(0.5, 0.0, 0.0) + 0.3 * roughness * random_point(rng);
+    const LookedAtAll expected = look_at_all(ring, x);
+    EXPECT_NEAR(deviation_at(ring, x), expected.deviation, 1e-12 * (1 + roughness)) << round;
+    const double one_step = 1e9;
+    EXPECT_LT(glm::length(closest_position(ring, x, one_step) - expected.next), 1e-12 * (1 + roughness)) << round;
+  }
+}
+
+TEST(VertexPlacement, FarFromTheOriginNoTriangleIsPassedOverForRounding) {
+  std::mt19937 rng(5);
+  std::uniform_real_distribution<double> u;
+  for (int round = 0; round < 100; ++round) {
+    CollapseRing ring = grid_ring([&](double, double) { return 0.1 * u(rng); });
+    const dvec3 offset(1e7, -3e7, 1e7);  // what a float of a unit edge still holds
+    for (auto& t : ring.before) t = {t.corners[0] + offset, t.corners[1] + offset, t.corners[2] + offset};
+    for (auto& t : ring.after) t[0] += offset, t[1] += offset;
+    for (dvec3& p : ring.samples_before) p += offset;
+    for (dvec3& p : ring.neighbours_after) p += offset;
+    const dvec3 x = offset + dvec3(0.5, 0.0, 0.1 * u(rng));
+    EXPECT_NEAR(deviation_at(ring, x), look_at_all(ring, x).deviation, 1e-7);
+  }
+}
+
+TEST(VertexPlacement, WithoutFacesNothingIsNear) {
+  CollapseRing ring = grid_ring([](double, double) { return 0.0; });
+  ring.after.clear();
+  EXPECT_EQ(deviation_at(ring, dvec3(0.0)), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(closest_position(ring, {1, 2, 3}, 1e-6), dvec3(1, 2, 3));
+  ring = grid_ring([](double, double) { return 0.0; });
+  ring.before.clear();
+  EXPECT_EQ(deviation_at(ring, dvec3(0.0)), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(closest_position(ring, {1, 2, 3}, 1e-6), dvec3(1, 2, 3));
+}
+
 TEST(VertexPlacement, ClosestPointIsNoFartherThanAnyPointOfTheTriangle) {
   std::mt19937 rng(1);
   std::uniform_real_distribution<double> u;
