@@ -75,7 +75,7 @@ LookedAtAll look_at_all(const CollapseRing& ring, const dvec3& x) {
     std::vector<dvec3> points, weights;
     for (const auto& [q, s] : ring.after) {
       weights.push_back(closest_barycentric(p, x, q, s));
-      points.push_back(weights.back().x * x + weights.back().y * q + weights.back().z * s);
+      points.push_back(weights.back().x * x + (weights.back().y * q + weights.back().z * s));
     }
     const size_t i = static_cast<size_t>(std::ranges::min_element(points, farther(p)) - points.begin());
     add(weights[i].x, weights[i].y * ring.after[i][0] + weights[i].z * ring.after[i][1], p);
@@ -118,18 +118,22 @@ TEST(VertexPlacement, FindsWhatLookingAtEveryTriangleFinds) {
   }
 }
 
-TEST(VertexPlacement, FarFromTheOriginNoTriangleIsPassedOverForRounding) {
+TEST(VertexPlacement, FarFromTheOriginItFindsTheSame) {
   std::mt19937 rng(5);
   std::uniform_real_distribution<double> u;
-  for (int round = 0; round < 100; ++round) {
-    CollapseRing ring = grid_ring([&](double, double) { return 0.1 * u(rng); });
-    const dvec3 offset(1e7, -3e7, 1e7);  // what a float of a unit edge still holds
-    for (auto& t : ring.before) t = {t.corners[0] + offset, t.corners[1] + offset, t.corners[2] + offset};
-    for (auto& t : ring.after) t[0] += offset, t[1] += offset;
-    for (dvec3& p : ring.samples_before) p += offset;
-    for (dvec3& p : ring.neighbours_after) p += offset;
-    const dvec3 x = offset + dvec3(0.5, 0.0, 0.1 * u(rng));
-    EXPECT_NEAR(deviation_at(ring, x), look_at_all(ring, x).deviation, 1e-7);
+  const dvec3 offset(1e7, -3e7, 1e7);
+  for (int round = 0; round < 600; ++round) {
+    const double edge = round % 2 == 0 ? 1.0 : std::exp2(-28 - 4 * u(rng));  // one to a few steps of a double there
+    const auto moved = [&](const dvec3& p) { return offset + edge * p; };
+    CollapseRing ring = grid_ring([&](double, double) { return 0.3 * u(rng); });
+    for (auto& t : ring.before) t = {moved(t.corners[0]), moved(t.corners[1]), moved(t.corners[2])};
+    for (auto& t : ring.after) t = {moved(t[0]), moved(t[1])};
+    for (dvec3& p : ring.samples_before) p = moved(p);
+    for (dvec3& p : ring.neighbours_after) p = moved(p);
+    const dvec3 x = moved({0.5, 0.0, 0.3 * u(rng)});
+    const LookedAtAll expected = look_at_all(ring, x);
+    EXPECT_NEAR(deviation_at(ring, x), expected.deviation, 1e-10) << round;
+    EXPECT_LT(glm::length(closest_position(ring, x, 1e9) - expected.next), 1e-10) << round;
   }
 }
 
