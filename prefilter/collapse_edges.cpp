@@ -45,7 +45,8 @@ class CollapsibleMesh {
  public:
   std::vector<dvec3> positions;
   std::vector<uvec3> triangles;
-  std::vector<FaceMaterial> materials;
+  std::span<const uint32_t> faces;    ///< per face: its number in the whole surface
+  std::span<FaceMaterial> materials;  ///< of the whole surface; no other part touches those of `faces`
   std::vector<uint32_t> merged_into;  ///< per vertex: itself while it lives, else a smaller one
   std::vector<uint8_t> is_face_alive;
   std::vector<uint8_t> is_flipped;  ///< per face: see flipped_faces()
@@ -54,7 +55,9 @@ class CollapsibleMesh {
   std::vector<uint8_t> is_fixed;    ///< per face: keeps its corners where they are; empty: none does
   std::vector<uint8_t> is_pinned;   ///< per vertex: stays where it is; empty: none does
 
-  /// Call once the arrays of positions, triangles and materials are filled.
+  FaceMaterial& material(uint32_t face) { return materials[faces[face]]; }
+
+  /// Call once the arrays of positions and triangles are filled.
   void build_topology() {
     merged_into.resize(positions.size());
     std::iota(merged_into.begin(), merged_into.end(), 0u);
@@ -375,10 +378,10 @@ class Simplifier {
       area_after_[i] = 0.5 * glm::length(area_vector({x, ring_.after[i][0], ring_.after[i][1]}));
     }
     for (const auto* faces : {&kept_, &collapsing_}) {
-      for (const uint32_t face : *faces) ring_materials_.push_back(mesh_.materials[face]);
+      for (const uint32_t face : *faces) ring_materials_.push_back(mesh_.material(face));
     }
     filter_materials(area_before_, area_after_, ring_materials_);
-    for (size_t i = 0; i < kept_.size(); ++i) mesh_.materials[kept_[i]] = ring_materials_[i];
+    for (size_t i = 0; i < kept_.size(); ++i) mesh_.material(kept_[i]) = ring_materials_[i];
   }
 
   CollapsibleMesh& mesh_;
@@ -404,20 +407,21 @@ bool is_all_fixed(const EdgeCollapseOptions& options, const SurfaceParts& parts,
   return std::ranges::all_of(parts.faces_of(part), [&](uint32_t face) { return options.is_fixed[face] != 0; });
 }
 
-CollapsibleMesh extract_part(const Surface& surface, const EdgeCollapseOptions& options, const SurfaceParts& parts,
+/// Its materials stay where they are, and change there.
+CollapsibleMesh extract_part(Surface& surface, const EdgeCollapseOptions& options, const SurfaceParts& parts,
                              size_t part) {
   CollapsibleMesh mesh;
-  mesh.positions.reserve(parts.vertices_of(part).size());
-  mesh.triangles.reserve(parts.faces_of(part).size());
-  mesh.materials.reserve(parts.faces_of(part).size());
-  for (const uint32_t vertex : parts.vertices_of(part)) mesh.positions.emplace_back(surface.positions[vertex]);
-  for (const uint32_t face : parts.faces_of(part)) {
+  const auto vertices = parts.vertices_of(part);
+  mesh.faces = parts.faces_of(part);
+  mesh.materials = surface.materials;
+  mesh.positions.reserve(vertices.size());
+  mesh.triangles.reserve(mesh.faces.size());
+  for (const uint32_t vertex : vertices) mesh.positions.emplace_back(surface.positions[vertex]);
+  for (const uint32_t face : mesh.faces) {
     const uvec3& t = surface.triangles[face];
     mesh.triangles.emplace_back(parts.local_vertex[t.x], parts.local_vertex[t.y], parts.local_vertex[t.z]);
-    mesh.materials.push_back(surface.materials[face]);
   }
   mesh.build_topology();
-  const auto vertices = parts.vertices_of(part);
   if (!options.deviation.empty()) {
     for (size_t v = 0; v < vertices.size(); ++v) mesh.deviation[v] = options.deviation[vertices[v]];
   }
@@ -425,7 +429,7 @@ CollapsibleMesh extract_part(const Surface& surface, const EdgeCollapseOptions& 
     for (const uint32_t vertex : vertices) mesh.is_pinned.push_back(options.is_pinned[vertex]);
   }
   if (!options.is_fixed.empty()) {
-    for (const uint32_t face : parts.faces_of(part)) mesh.is_fixed.push_back(options.is_fixed[face]);
+    for (const uint32_t face : mesh.faces) mesh.is_fixed.push_back(options.is_fixed[face]);
   }
   return mesh;
 }
@@ -441,7 +445,6 @@ void store_part(const CollapsibleMesh& mesh, const SurfaceParts& parts, size_t p
     const uvec3& t = mesh.triangles[f];
     working.is_face_alive[faces[f]] = mesh.is_face_alive[f];
     working.surface.triangles[faces[f]] = {vertices[t.x], vertices[t.y], vertices[t.z]};
-    working.surface.materials[faces[f]] = mesh.materials[f];
   }
 }
 
@@ -454,7 +457,7 @@ SimplifyResult collapse_edges(const Surface& surface, const EdgeCollapseOptions&
     parallel_for(parts.size(), 16, [&](size_t begin, size_t end) {
       for (size_t part = begin; part < end && !job.is_cancelled(); ++part) {
         if (is_all_fixed(options, parts, part)) continue;
-        CollapsibleMesh mesh = extract_part(surface, options, parts, part);
+        CollapsibleMesh mesh = extract_part(working.surface, options, parts, part);
         Simplifier(mesh, options, job).run();
         store_part(mesh, parts, part, working);
       }
