@@ -45,7 +45,8 @@ class CollapsibleMesh {
  public:
   std::vector<dvec3> positions;
   std::vector<uvec3> triangles;
-  std::vector<FaceMaterial> materials;
+  std::span<const uint32_t> faces;    ///< per face: its number in the whole surface
+  std::span<FaceMaterial> materials;  ///< of the whole surface; no other part touches those of `faces`
   std::vector<uint32_t> merged_into;  ///< per vertex: itself while it lives, else a smaller one
   std::vector<uint8_t> is_face_alive;
   std::vector<uint8_t> is_flipped;  ///< per face: see flipped_faces()
@@ -54,7 +55,9 @@ class CollapsibleMesh {
   std::vector<uint8_t> is_fixed;    ///< per face: keeps its corners where they are; empty: none does
   std::vector<uint8_t> is_pinned;   ///< per vertex: stays where it is; empty: none does
 
-  /// Call once the arrays of positions, triangles and materials are filled.
+  FaceMaterial& material(uint32_t face) { return materials[faces[face]]; }
+
+  /// Call once the arrays of positions and triangles are filled.
   void build_topology() {
     merged_into.resize(positions.size());
     std::iota(merged_into.begin(), merged_into.end(), 0u);
@@ -139,7 +142,8 @@ class Simplifier {
     }
     Candidate candidate;
     while (!job_.is_cancelled() && queue_.pop(candidate)) {
-      if (is_current(candidate) && try_collapse(candidate.a, candidate.b)) push_edges_at(candidate.a);
+      if (!is_current(candidate) || !try_collapse(candidate.a, candidate.b)) continue;
+      for (const uint32_t neighbour : neighbours_) push(candidate.a, neighbour);
     }
   }
 
@@ -164,11 +168,6 @@ class Simplifier {
     queue_.push({length2, a, b, mesh_.version[a], mesh_.version[b]});
   }
 
-  void push_edges_at(uint32_t vertex) {
-    mesh_.find_spokes(vertex, spokes_a_);
-    for (const Spoke& spoke : spokes_a_) push(vertex, spoke.vertex);
-  }
-
   bool is_current(const Candidate& candidate) const {
     return mesh_.version[candidate.a] == candidate.version_a && mesh_.version[candidate.b] == candidate.version_b;
   }
@@ -181,9 +180,11 @@ class Simplifier {
     mesh_.find_spokes(b, spokes_b_);
     if (kept_.empty() || !keeps_topology(a, b)) return false;
     fill_ring(a, b);
-    const std::optional<Placement> placement = find_placement(a, b);
-    if (!placement) return false;
-    commit(a, b, *placement);
+    const std::optional<dvec3> x = find_place(a, b);
+    if (!x || !keeps_edges_short(a, b, *x) || !keeps_faces(*x)) return false;
+    const double deviation = deviation_at(ring_, *x) + std::max(mesh_.deviation[a], mesh_.deviation[b]);
+    if (!(deviation <= kMaxDeviation * resolution_)) return false;
+    commit(a, b, *x, deviation);
     return true;
   }
 
@@ -273,45 +274,45 @@ class Simplifier {
       ring_.after.push_back({position(q), position(s)});
     }
     ring_.samples_before = {position(a), position(b), 0.5 * (position(a) + position(b))};
-    longest_spoke_ = 0;
-    for (const Spoke& spoke : spokes_a_) {
-      if (spoke.vertex == b) continue;
-      longest_spoke_ = std::max(longest_spoke_, glm::length(position(spoke.vertex) - position(a)));
-      ring_.samples_before.push_back(0.5 * (position(a) + position(spoke.vertex)));
-      ring_.neighbours_after.push_back(position(spoke.vertex));
-    }
-    for (const Spoke& spoke : spokes_b_) {
-      if (spoke.vertex == a) continue;
-      longest_spoke_ = std::max(longest_spoke_, glm::length(position(spoke.vertex) - position(b)));
-      ring_.samples_before.push_back(0.5 * (position(b) + position(spoke.vertex)));
-      const bool is_common = std::binary_search(common_.begin(), common_.end(), spoke.vertex);
-      if (!is_common) ring_.neighbours_after.push_back(position(spoke.vertex));
-    }
+    // Topology is kept, so every vertex next to a or b has a face that stays, and is next to the merged vertex.
+    double longest2 = 0;
+    neighbours_.clear();
+    const auto add_spokes = [&](uint32_t vertex, const std::vector<Spoke>& spokes, uint32_t excluded) {
+      for (const Spoke& spoke : spokes) {
+        if (spoke.vertex == excluded) continue;
+        longest2 = std::max(longest2, squared_length(position(spoke.vertex) - position(vertex)));
+        ring_.samples_before.push_back(0.5 * (position(vertex) + position(spoke.vertex)));
+        const bool is_seen = vertex == b && std::binary_search(common_.begin(), common_.end(), spoke.vertex);
+        if (!is_seen) neighbours_.push_back(spoke.vertex);
+      }
+    };
+    add_spokes(a, spokes_a_, b);
+    add_spokes(b, spokes_b_, a);
+    longest_spoke_ = std::sqrt(longest2);
+    for (const uint32_t neighbour : neighbours_) ring_.neighbours_after.push_back(position(neighbour));
   }
 
-  /// Where the merged vertex goes, or nothing if no place keeps faces, edges and deviation within bounds.
-  std::optional<Placement> find_placement(uint32_t a, uint32_t b) const {
+  /// Where the merged vertex goes, or nothing if it has no place.
+  std::optional<dvec3> find_place(uint32_t a, uint32_t b) const {
     const dvec3 pa = mesh_.positions[a], pb = mesh_.positions[b];
     const double tolerance = kPlacementTolerance * resolution_;
-    const auto accept = [&](const Placement& placement) -> std::optional<Placement> {
-      return is_valid(a, b, placement) ? std::optional(placement) : std::nullopt;
-    };
-    if (is_pinned(a) || is_pinned(b))
-      return may_merge_into_pinned(a, b) ? accept(keep_vertex(ring_, is_pinned(a) ? pa : pb)) : std::nullopt;
+    if (is_pinned(a) || is_pinned(b)) {
+      return may_merge_into_pinned(a, b) ? std::optional(is_pinned(a) ? pa : pb) : std::nullopt;
+    }
     const auto optimum = [&] { return closest_position(ring_, 0.5 * (pa + pb), tolerance); };
     if (kind_a_ == VertexKind::Interior && kind_b_ == VertexKind::Interior) {
       const dvec3 x = optimum();
-      return accept(keep_vertex(ring_, chosen_between(x, with_same_volume(ring_, x))));
+      return chosen_between(x, with_same_volume(ring_, x));
     }
     if (kind_a_ == VertexKind::Curve && kind_b_ == VertexKind::Curve) {
       const dvec3 x = optimum();
       const dvec3 p = mesh_.positions[curve_neighbour(spokes_a_, b)],
                   q = mesh_.positions[curve_neighbour(spokes_b_, a)];
       const auto limit = with_same_border_area(p, pa, pb, q, x);
-      return limit ? accept(keep_vertex(ring_, chosen_between(x, *limit))) : std::nullopt;
+      return limit ? std::optional(chosen_between(x, *limit)) : std::nullopt;
     }
     const bool stays_at_a = kind_b_ == VertexKind::Interior || kind_a_ == VertexKind::Corner;
-    return accept(keep_vertex(ring_, stays_at_a ? pa : pb));
+    return stays_at_a ? pa : pb;
   }
 
   bool is_pinned(uint32_t vertex) const { return !mesh_.is_pinned.empty() && mesh_.is_pinned[vertex] != 0; }
@@ -343,33 +344,28 @@ class Simplifier {
     return kNoIndex;
   }
 
-  bool is_valid(uint32_t a, uint32_t b, const Placement& placement) const {
-    const double total_deviation = placement.deviation + std::max(mesh_.deviation[a], mesh_.deviation[b]);
-    if (!(total_deviation <= kMaxDeviation * resolution_)) return false;
-
-    // Where the source is coarser than that, edges may grow a little: a tube's ring could not merge otherwise.
+  /// Where the source is coarser than the limit, edges may grow a little: a tube's ring could not merge otherwise.
+  bool keeps_edges_short(uint32_t a, uint32_t b, const dvec3& x) const {
     const double edge = glm::length(mesh_.positions[b] - mesh_.positions[a]);
     const double limit = kLongEdge * resolution_;
     const double longest = longest_spoke_ > limit ? longest_spoke_ + 0.5 * edge : limit;
-    for (const dvec3& neighbour : ring_.neighbours_after) {
-      if (squared_length(neighbour - placement.position) > longest * longest) return false;
-    }
+    return std::ranges::none_of(ring_.neighbours_after, [&](const dvec3& neighbour) {
+      return squared_length(neighbour - x) > longest * longest;
+    });
+  }
+
+  bool keeps_faces(const dvec3& x) const {
     for (size_t i = 0; i < kept_.size(); ++i) {
-      if (!is_face_valid(i, placement.position)) return false;
+      const auto& [q, s] = ring_.after[i];
+      if (!keeps_face(ring_.before[i].corners, {x, q, s})) return false;  // corners in the same order, up to a rotation
     }
     return true;
   }
 
-  bool is_face_valid(size_t i, const dvec3& x) const {
-    const auto& [p0, p1, p2] = ring_.before[i];
-    const auto& [q, s] = ring_.after[i];
-    return keeps_face({p0, p1, p2}, {x, q, s});  // starts at the corner that moves, in the triangle's order
-  }
-
-  void commit(uint32_t a, uint32_t b, const Placement& placement) {
-    filter_ring_materials(placement.position);
-    mesh_.deviation[a] = placement.deviation + std::max(mesh_.deviation[a], mesh_.deviation[b]);
-    mesh_.positions[a] = placement.position;
+  void commit(uint32_t a, uint32_t b, const dvec3& x, double deviation) {
+    filter_ring_materials(x);
+    mesh_.deviation[a] = deviation;
+    mesh_.positions[a] = x;
     mesh_.merge(a, b, kept_, collapsing_);
   }
 
@@ -377,15 +373,15 @@ class Simplifier {
     area_before_.clear();
     area_after_.assign(ring_.before.size(), 0.0);
     ring_materials_.clear();
-    for (const auto& [p0, p1, p2] : ring_.before) area_before_.push_back(0.5 * glm::length(area_vector({p0, p1, p2})));
+    for (const BoundedTriangle& t : ring_.before) area_before_.push_back(0.5 * glm::length(area_vector(t.corners)));
     for (size_t i = 0; i < kept_.size(); ++i) {
       area_after_[i] = 0.5 * glm::length(area_vector({x, ring_.after[i][0], ring_.after[i][1]}));
     }
     for (const auto* faces : {&kept_, &collapsing_}) {
-      for (const uint32_t face : *faces) ring_materials_.push_back(mesh_.materials[face]);
+      for (const uint32_t face : *faces) ring_materials_.push_back(mesh_.material(face));
     }
     filter_materials(area_before_, area_after_, ring_materials_);
-    for (size_t i = 0; i < kept_.size(); ++i) mesh_.materials[kept_[i]] = ring_materials_[i];
+    for (size_t i = 0; i < kept_.size(); ++i) mesh_.material(kept_[i]) = ring_materials_[i];
   }
 
   CollapsibleMesh& mesh_;
@@ -398,6 +394,7 @@ class Simplifier {
   std::vector<uint32_t> kept_, collapsing_, common_;
   size_t kept_of_a_ = 0;  ///< the first of kept_ are a's
   std::vector<Spoke> spokes_a_, spokes_b_;
+  std::vector<uint32_t> neighbours_;  ///< of the merged vertex
   VertexKind kind_a_{}, kind_b_{};
   CollapseRing ring_;         ///< its `before` and `after` follow kept_, then collapsing_
   double longest_spoke_ = 0;  ///< length of the longest edge at a or b, but for ab
@@ -410,17 +407,21 @@ bool is_all_fixed(const EdgeCollapseOptions& options, const SurfaceParts& parts,
   return std::ranges::all_of(parts.faces_of(part), [&](uint32_t face) { return options.is_fixed[face] != 0; });
 }
 
-CollapsibleMesh extract_part(const Surface& surface, const EdgeCollapseOptions& options, const SurfaceParts& parts,
+/// Its materials stay where they are, and change there.
+CollapsibleMesh extract_part(Surface& surface, const EdgeCollapseOptions& options, const SurfaceParts& parts,
                              size_t part) {
   CollapsibleMesh mesh;
-  for (const uint32_t vertex : parts.vertices_of(part)) mesh.positions.emplace_back(surface.positions[vertex]);
-  for (const uint32_t face : parts.faces_of(part)) {
+  const auto vertices = parts.vertices_of(part);
+  mesh.faces = parts.faces_of(part);
+  mesh.materials = surface.materials;
+  mesh.positions.reserve(vertices.size());
+  mesh.triangles.reserve(mesh.faces.size());
+  for (const uint32_t vertex : vertices) mesh.positions.emplace_back(surface.positions[vertex]);
+  for (const uint32_t face : mesh.faces) {
     const uvec3& t = surface.triangles[face];
     mesh.triangles.emplace_back(parts.local_vertex[t.x], parts.local_vertex[t.y], parts.local_vertex[t.z]);
-    mesh.materials.push_back(surface.materials[face]);
   }
   mesh.build_topology();
-  const auto vertices = parts.vertices_of(part);
   if (!options.deviation.empty()) {
     for (size_t v = 0; v < vertices.size(); ++v) mesh.deviation[v] = options.deviation[vertices[v]];
   }
@@ -428,7 +429,7 @@ CollapsibleMesh extract_part(const Surface& surface, const EdgeCollapseOptions& 
     for (const uint32_t vertex : vertices) mesh.is_pinned.push_back(options.is_pinned[vertex]);
   }
   if (!options.is_fixed.empty()) {
-    for (const uint32_t face : parts.faces_of(part)) mesh.is_fixed.push_back(options.is_fixed[face]);
+    for (const uint32_t face : mesh.faces) mesh.is_fixed.push_back(options.is_fixed[face]);
   }
   return mesh;
 }
@@ -444,7 +445,6 @@ void store_part(const CollapsibleMesh& mesh, const SurfaceParts& parts, size_t p
     const uvec3& t = mesh.triangles[f];
     working.is_face_alive[faces[f]] = mesh.is_face_alive[f];
     working.surface.triangles[faces[f]] = {vertices[t.x], vertices[t.y], vertices[t.z]};
-    working.surface.materials[faces[f]] = mesh.materials[f];
   }
 }
 
@@ -457,7 +457,7 @@ SimplifyResult collapse_edges(const Surface& surface, const EdgeCollapseOptions&
     parallel_for(parts.size(), 16, [&](size_t begin, size_t end) {
       for (size_t part = begin; part < end && !job.is_cancelled(); ++part) {
         if (is_all_fixed(options, parts, part)) continue;
-        CollapsibleMesh mesh = extract_part(surface, options, parts, part);
+        CollapsibleMesh mesh = extract_part(working.surface, options, parts, part);
         Simplifier(mesh, options, job).run();
         store_part(mesh, parts, part, working);
       }

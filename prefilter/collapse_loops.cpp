@@ -211,7 +211,7 @@ class LoopCollapser {
       fill_ring(g);
       double old = 0;
       for (const uint32_t v : vertices_of(groups_[g])) old = std::max(old, deviation[v]);
-      deviations_.push_back(old + keep_vertex(ring_, new_positions_[g]).deviation);
+      deviations_.push_back(old + deviation_at(ring_, new_positions_[g]));
       largest = std::max(largest, deviations_.back());
     }
     if (!(largest <= kMaxDeviation * resolution_)) return std::nullopt;

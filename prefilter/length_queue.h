@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edges, shortest first, in parts of similar length: only the part at hand is a heap, small enough for the caches where
-// one heap of all edges misses them at each of its steps.
+// Edges, shortest first, in parts of similar length: only the part at hand is sorted, small enough for the caches where
+// one heap of all edges misses them at each of its steps. What comes to that part later, little, is a heap beside it.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 namespace farfield {
@@ -21,32 +22,40 @@ class LengthQueue {
 
   void push(const Edge& edge) {
     const auto part = std::min(static_cast<size_t>(edge.length2 * parts_per_length2_), parts_.size() - 1);
-    std::vector<Edge>& edges = parts_[std::max(part, first_)];
-    edges.push_back(edge);
-    if (part <= first_) std::push_heap(edges.begin(), edges.end());
+    if (part >= next_) {
+      parts_[part].push_back(edge);
+    } else {
+      late_.push_back(edge);
+      std::push_heap(late_.begin(), late_.end());
+    }
   }
 
   /// Takes the top away; false if there is none.
   bool pop(Edge& edge) {
-    while (parts_[first_].empty()) {
-      if (first_ + 1 == parts_.size()) return false;
-      parts_[first_] = {};
-      ++first_;
-      std::make_heap(parts_[first_].begin(), parts_[first_].end());
+    while (sorted_.empty() && late_.empty()) {
+      if (next_ == parts_.size()) return false;
+      sorted_ = std::exchange(parts_[next_++], {});
+      std::sort(sorted_.begin(), sorted_.end());
     }
-    std::vector<Edge>& edges = parts_[first_];
-    std::pop_heap(edges.begin(), edges.end());
-    edge = edges.back();
-    edges.pop_back();
+    if (late_.empty() || (!sorted_.empty() && late_.front() < sorted_.back())) {
+      edge = sorted_.back();
+      sorted_.pop_back();
+    } else {
+      edge = late_.front();
+      std::pop_heap(late_.begin(), late_.end());
+      late_.pop_back();
+    }
     return true;
   }
 
  private:
   static constexpr size_t kEdgesPerPart = 512, kMostParts = 1 << 14;
 
-  std::vector<std::vector<Edge>> parts_;  ///< by length; the first is a heap
+  std::vector<std::vector<Edge>> parts_;  ///< by length
   double parts_per_length2_;
-  size_t first_ = 0;  ///< those before it are empty and stay so
+  size_t next_ = 0;           ///< those before it are empty and stay so
+  std::vector<Edge> sorted_;  ///< the part at hand, the top last
+  std::vector<Edge> late_;    ///< what came to it, or before it, since: a heap
 };
 
 }  // namespace farfield

@@ -7,30 +7,37 @@
 #include <vector>
 
 #include "base/vec.h"
+#include "prefilter/collapse_limits.h"
 
 namespace farfield {
 
+/// A triangle and a ball around it, in scene units: searches pass it over where a point is too far from the ball.
+struct BoundedTriangle {
+  Corners corners;
+  dvec3 center;
+  double radius;
+
+  BoundedTriangle(const dvec3& a, const dvec3& b, const dvec3& c);
+};
+
 /// The surface around an edge before and after its collapse into a vertex x. All lengths in scene units.
 struct CollapseRing {
-  std::vector<std::array<dvec3, 3>> before;  ///< triangles at either end of the edge, wound alike
-  std::vector<std::array<dvec3, 2>> after;   ///< triangles that stay: x and these two corners, wound as before
-  std::vector<dvec3> samples_before;         ///< points of the surface before: edge ends, middles of the edges at them
-  std::vector<dvec3> neighbours_after;       ///< vertices that share an edge with x
+  std::vector<BoundedTriangle> before;      ///< triangles at either end of the edge, wound alike
+  std::vector<std::array<dvec3, 2>> after;  ///< triangles that stay: x and these two corners, wound as before
+  std::vector<dvec3> samples_before;        ///< points of the surface before: edge ends, middles of the edges at them
+  std::vector<dvec3> neighbours_after;      ///< vertices that share an edge with x
 
   void clear();
 };
 
-struct Placement {
-  dvec3 position;
-  double deviation;  ///< largest distance from a sample of one surface to the other
-};
-
 /// Where x goes from `start` so that the sum of squared distances between samples of each surface and the other
-/// surface falls, until it moves by less than `tolerance` [Loubet 2018, eq. 8.2.2]. The sum never grows. Pure function.
+/// surface falls, until it moves by less than `tolerance` [Loubet 2018, eq. 8.2.2]. The sum never grows. `start` if
+/// there is no face before or none after. Pure function.
 dvec3 closest_position(const CollapseRing& ring, const dvec3& start, double tolerance);
 
-/// How far the surfaces are from each other with this x. Pure function.
-Placement keep_vertex(const CollapseRing& ring, const dvec3& position);
+/// The largest distance from a sample of one surface to the other, with this x; infinite if one has no
+/// face. Pure function.
+double deviation_at(const CollapseRing& ring, const dvec3& x);
 
 /// The point between `from` and `to` where the area after the collapse is nearest to the area before. The optimum above
 /// lies a little inside of curved surfaces, and level by level they would shrink; with the same volume, or the same
