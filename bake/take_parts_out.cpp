@@ -19,10 +19,7 @@ struct RepeatedMesh {
   std::vector<Triangles> triangles;
 };
 
-mat4x3 surface_to_part(const glm::dmat4x3& to_surface) {
-  const glm::dmat3 linear = glm::inverse(glm::dmat3(to_surface[0], to_surface[1], to_surface[2]));
-  return mat4x3(glm::dmat4x3(linear[0], linear[1], linear[2], -(linear * to_surface[3])));
-}
+mat4x3 surface_to_part(const SurfacePlacement& placement) { return mat4x3(inverse_of(placement.to_surface)); }
 
 /// Whether a part takes at most a quarter of what its triangles would take in all places: rays pay for each place that
 /// they pass. Level 0 of an oak takes 60 bytes a triangle, a place Embree's 104 bytes beside its own, a part a scene.
@@ -45,9 +42,7 @@ bool are_alike(const SourceSurface& source, const Triangles& first, const Triang
 bool is_part(const SourceSurface& source, const RepeatedMesh& repeated) {
   const auto& triangles = repeated.triangles;
   if (triangles.size() < 2 || !pays(triangles.size(), triangles[0].size())) return false;
-  const auto has_inverse = [&](uint32_t place) {
-    return can_be_undone(surface_to_part(source.placements[place].to_surface));
-  };
+  const auto has_inverse = [&](uint32_t place) { return can_be_undone(surface_to_part(source.placements[place])); };
   return std::ranges::all_of(repeated.places, has_inverse) &&
          std::ranges::all_of(triangles, [&](const Triangles& other) { return are_alike(source, triangles[0], other); });
 }
@@ -140,12 +135,12 @@ std::optional<PartedSource> take_parts_out(const SourceSurface& source) {
   builder.add(own, 0, glm::dmat4x3(1.0), glm::dmat3(1.0));
   uint32_t part = 0;
   for (const auto& [mesh, repeated] : meshes) {
-    const glm::dmat4x3& to_surface = source.placements[repeated.places[0]].to_surface;
-    const glm::dmat3 linear(to_surface[0], to_surface[1], to_surface[2]);
+    const SurfacePlacement& first = source.placements[repeated.places[0]];
+    const glm::dmat3 linear(first.to_surface[0], first.to_surface[1], first.to_surface[2]);
     const uint32_t first_face = source.source_face[repeated.triangles[0][0]];
-    builder.add(repeated.triangles[0], part + 1, surface_to_part(to_surface), glm::transpose(linear));
+    builder.add(repeated.triangles[0], part + 1, surface_to_part(first), glm::transpose(linear));
     for (size_t i = 0; i < repeated.places.size(); ++i) {
-      builder.out().places.push_back({surface_to_part(source.placements[repeated.places[i]].to_surface), part,
+      builder.out().places.push_back({surface_to_part(source.placements[repeated.places[i]]), part,
                                       source.source_face[repeated.triangles[i][0]] - first_face});
     }
     ++part;

@@ -26,13 +26,8 @@ Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, 
   }
   const auto make = [&] {
     std::vector<EmbreeGeometry> geometries(1);
-    if (const auto own = level.quads.first(level.own_quad_count()); !own.empty()) {
-      geometries[0] = new_quads(device.handle());
-      const EmbreeGeometryRef quads = geometries[0].get();
-      share_array(quads, level.positions);
-      share_array(quads, own);
-      if (filter) set_filter(quads, filter, user);
-    }
+    const auto own = level.quads.first(level.own_quad_count());
+    if (!own.empty()) geometries[0] = make_quads(device, level, own, filter, user);
     if (result.parts_) geometries.push_back(result.parts_->make_geometry(device.handle()));
     return geometries;
   };

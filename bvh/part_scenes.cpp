@@ -17,6 +17,7 @@ namespace {
 // Bounds of a place grow by this fraction of their size and of their distance from the origin: rays are transformed in
 // floats.
 constexpr float kRelativePad = 1e-6f;
+
 std::vector<vec3> points_of(const LevelView& level, uint32_t part) {
   std::vector<vec3> points;
   for (const uint32_t v : part_vertices(level, part)) points.push_back(level.positions[v]);
@@ -40,22 +41,28 @@ LoadTerms terms_after(const LoadTerms& terms, uint64_t bytes) {
 
 }  // namespace
 
+EmbreeGeometry make_quads(BvhDevice& device, const LevelView& level, std::span<const Quad> quads, EmbreeFilter filter,
+                          void* user) {
+  EmbreeGeometry geometry = new_quads(device.handle());
+  share_array(geometry.get(), level.positions);
+  share_array(geometry.get(), quads);
+  if (filter) set_filter(geometry.get(), filter, user);
+  return geometry;
+}
+
 Result<PartScenes> PartScenes::build(BvhDevice& device, const LevelView& level, const LoadTerms& terms,
                                      EmbreeFilter filter, void* user) {
   PartScenes parts;
   parts.placements_ = level.placements;
   for (uint32_t part = 0; part < level.part_first_quad.size(); ++part) {
     const auto [first, end] = level.part_quads(part);
+    const auto quads = level.quads.subspan(first, end - first);
     const auto make = [&] {
       std::vector<EmbreeGeometry> geometries;
-      geometries.push_back(new_quads(device.handle()));
-      const EmbreeGeometryRef quads = geometries.back().get();
-      share_array(quads, level.positions);
-      share_array(quads, level.quads.subspan(first, end - first));
-      if (filter) set_filter(quads, filter, user);
+      geometries.push_back(make_quads(device, level, quads, filter, user));
       return geometries;
     };
-    const std::string what = fmt::format("the BVH of {} quads of part {}", end - first, part);
+    const std::string what = fmt::format("the BVH of {} quads of part {}", quads.size(), part);
     FARFIELD_TRY_LET(MeasuredScene built,
                      build_measured_scene(device, make, terms_after(terms, parts.bytes_), what, part + 1));
     parts.scenes_.push_back(std::move(built.scene));

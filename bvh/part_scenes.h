@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/embree.h"
@@ -13,6 +14,10 @@
 #include "cache/level.h"
 
 namespace farfield {
+
+/// A geometry of some of a level's quads. Arrays, filter: as LevelScene::build().
+EmbreeGeometry make_quads(BvhDevice& device, const LevelView& level, std::span<const Quad> quads, EmbreeFilter filter,
+                          void* user);
 
 /// The scenes of a level's parts. Does not move once it has made its geometry; any thread may trace it.
 class PartScenes {

@@ -120,14 +120,14 @@ class Flattener {
 
 }  // namespace
 
+glm::dmat4x3 inverse_of(const glm::dmat4x3& transform) {
+  const glm::dmat3 linear = glm::inverse(glm::dmat3(transform[0], transform[1], transform[2]));
+  return {linear[0], linear[1], linear[2], -(linear * transform[3])};
+}
+
 bool can_be_undone(const mat4x3& transform) {
   return is_in_range(glm::dmat4x3(transform)) && glm::determinant(linear_part(transform)) != 0 &&
          is_in_range(to_level({transform, 0, 0}));
-}
-
-glm::dmat4x3 to_level(const PartPlacement& placement) {
-  const glm::dmat3 linear = glm::inverse(linear_part(placement.level_to_part));
-  return {linear[0], linear[1], linear[2], -(linear * glm::dvec3(placement.level_to_part[3]))};
 }
 
 std::vector<uint32_t> part_vertices(const LevelView& level, uint32_t part) {

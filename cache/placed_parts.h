@@ -10,10 +10,14 @@
 
 namespace farfield {
 
+/// The inverse of an affine transform whose determinant is not 0.
+glm::dmat4x3 inverse_of(const glm::dmat4x3& transform);
 /// Whether a transform is finite and has an inverse that is, within what rays can be traced in.
 bool can_be_undone(const mat4x3& transform);
 /// From the part's space to the level's, of a transform that can_be_undone().
-glm::dmat4x3 to_level(const PartPlacement& placement);
+inline glm::dmat4x3 to_level(const PartPlacement& placement) {
+  return inverse_of(glm::dmat4x3(placement.level_to_part));
+}
 
 /// The vertices of a part, each once.
 std::vector<uint32_t> part_vertices(const LevelView& level, uint32_t part);
