@@ -5,7 +5,7 @@ thousands of places (EXT_mesh_gpu_instancing), marked as one asset.
 
     scripts/make_tree_of_twigs.py OUT_DIR [--scale 1] [--trees 1]
 
-OUT_DIR/oak_of_twigs.gltf   trees in rows, the first at the origin; a twig has 156 triangles, a tree of scale 1 about
+OUT_DIR/oak_of_twigs.gltf   trees in rows, the first at the origin, and a camera under its crown; a twig has 156 triangles, a tree of scale 1 about
                             2.9 million
 --scale 0.01                about a hundredth of the triangles: for tests
 The same file every time for the same numpy.
@@ -85,6 +85,8 @@ def build(folder, scale, trees):
         document.json["nodes"] += [dict(node) for node in nodes]
         document.json["nodes"].append({"name": "oak", "translation": at, "extras": {"farfield_asset": True},
                                        "children": list(range(first, first + len(nodes)))})
+    document.json["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.7, "aspectRatio": 16 / 9, "znear": 0.01}}]
+    document.json["nodes"].append({"name": "under the crown", "camera": 0, "translation": [1.0, 5.0, 7.0]})
     document.write("oak_of_twigs.gltf")
     placed = len(transforms[0])
     triangles = bark.triangles() + sum(len(transforms[0][k::KINDS]) * meshes[1 + k][1].triangles() for k in range(KINDS))
