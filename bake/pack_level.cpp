@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <optional>
 #include <tuple>
 #include <type_traits>
@@ -180,8 +179,9 @@ uint64_t morton_code(const vec3& point, const Box3& box) {
 /// part: of a triangle.
 template <typename Part>
 void sort_along_curve(const Surface& surface, const Part& part, std::vector<Pair>& pairs) {
-  std::map<uint32_t, Box3> boxes;  // of parts
+  std::vector<Box3> boxes;  // of parts
   for (uint32_t face = 0; face < surface.triangles.size(); ++face) {
+    if (part(face) >= boxes.size()) boxes.resize(part(face) + 1);
     Box3& box = boxes[part(face)];
     for (int c = 0; c < 3; ++c) box.extend(surface.positions[surface.triangles[face][c]]);
   }

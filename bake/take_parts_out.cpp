@@ -5,6 +5,7 @@
 #include <map>
 
 #include "base/index.h"
+#include "base/index_map.h"
 #include "cache/placed_parts.h"
 
 namespace farfield {
@@ -66,30 +67,27 @@ std::map<uint32_t, RepeatedMesh> repeated_meshes(const SourceSurface& source) {
 /// Puts triangles of the source together anew.
 class PartedBuilder {
  public:
-  explicit PartedBuilder(const SourceSurface& source) : source_(source), vertex_(source.positions.size(), kNoIndex) {
+  explicit PartedBuilder(const SourceSurface& source) : source_(source) {
     out_.surface.materials = source.materials;
     out_.surface.origin = source.origin;
   }
 
   /// All of one call may share vertices.
   void add(const Triangles& triangles, uint32_t part, const glm::dmat4x3& transform, const glm::dmat3& of_normals) {
-    std::vector<uint32_t> used;
+    IndexMap vertices;
+    const auto first_vertex = static_cast<uint32_t>(out_.surface.positions.size());
     for (const uint32_t t : triangles) {
       uvec3 corners;
       for (int k = 0; k < 3; ++k) {
         const uint32_t v = source_.triangles[t][k];
-        if (vertex_[v] == kNoIndex) {
-          vertex_[v] = static_cast<uint32_t>(out_.surface.positions.size());
-          out_.surface.positions.emplace_back(transform * glm::dvec4(source_.positions[v], 1.0));
-          used.push_back(v);
-        }
-        corners[k] = vertex_[v];
+        const auto [index, is_new] = vertices.insert(v);
+        if (is_new) out_.surface.positions.emplace_back(transform * glm::dvec4(source_.positions[v], 1.0));
+        corners[k] = first_vertex + index;
       }
       out_.surface.triangles.push_back(corners);
       out_.part.push_back(part);
       copy_attributes(t, of_normals);
     }
-    for (const uint32_t v : used) vertex_[v] = kNoIndex;
   }
 
   PartedSource& out() { return out_; }
@@ -109,7 +107,6 @@ class PartedBuilder {
   }
 
   const SourceSurface& source_;
-  std::vector<uint32_t> vertex_;  ///< per vertex of the source, of the triangles at hand
   PartedSource out_;
 };
 
@@ -136,9 +133,8 @@ std::optional<PartedSource> take_parts_out(const SourceSurface& source) {
   uint32_t part = 0;
   for (const auto& [mesh, repeated] : meshes) {
     const SurfacePlacement& first = source.placements[repeated.places[0]];
-    const glm::dmat3 linear(first.to_surface[0], first.to_surface[1], first.to_surface[2]);
     const uint32_t first_face = source.source_face[repeated.triangles[0][0]];
-    builder.add(repeated.triangles[0], part + 1, surface_to_part(first), glm::transpose(linear));
+    builder.add(repeated.triangles[0], part + 1, surface_to_part(first), glm::transpose(glm::dmat3(first.to_surface)));
     for (size_t i = 0; i < repeated.places.size(); ++i) {
       builder.out().places.push_back({surface_to_part(source.placements[repeated.places[i]]), part,
                                       source.source_face[repeated.triangles[i][0]] - first_face});

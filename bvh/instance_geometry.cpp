@@ -34,10 +34,6 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // How much the range in which a ray meets an instance's local bounds is widened: rounding of the slab test.
 constexpr float kRangePad = 1e-6f;
 
-RayLanes to_local(const InstanceRecord& record, const EmbreeRay& ray) {
-  return RayLanes::of(ray).transformed(record.world_to_local);
-}
-
 /// Random bits of a ray in an instance.
 uint64_t bits_of_ray(const RayContext& context, uint32_t instance) { return mix64(context.ray_seed, instance); }
 
@@ -63,7 +59,7 @@ struct InstanceGeometry::Visit {
 inline bool InstanceGeometry::choose(const InstanceRecord& record, uint32_t instance, const EmbreeRay& ray,
                                      const RayContext& context, Visit& visit) const {
   const TracedAsset& asset = *assets[record.asset];
-  visit.ray = to_local(record, ray);
+  visit.ray = RayLanes::of(ray).transformed(record.world_to_local);
   if (!is_traceable(visit.ray.origin, visit.ray.direction)) return false;
   const RayRange range = clip_to_box(visit.ray.origin, visit.ray.direction, ray.tnear, ray.tfar, asset.bounds);
   if (!(range.t_near * (1.0f - kRangePad) <= range.t_far * (1.0f + kRangePad))) return false;

@@ -6,23 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/affine.h"
+#include "bvh/ray_lanes.h"
+
 namespace farfield {
-
-namespace {
-
-// World bounds grow by this fraction of their size and of their distance from the origin: the transform of a ray there
-// rounds by a few times 2^-24 of the coordinates it adds up.
-constexpr float kRelativePad = 1e-6f;
-
-glm::dmat3 linear_part(const mat4x3& m) { return {glm::dvec3(m[0]), glm::dvec3(m[1]), glm::dvec3(m[2])}; }
-
-bool is_in_range(const vec3& v) { return max_component(glm::abs(v)) <= kEmbreeLargest && is_finite(v); }
-
-bool is_in_range(const glm::dvec3& v) { return is_in_range(vec3(v)); }
-
-bool is_in_range(const glm::dmat3& m) { return is_in_range(m[0]) && is_in_range(m[1]) && is_in_range(m[2]); }
-
-}  // namespace
 
 vec3 InstanceRecord::normal_to_world(const vec3& n) const {
   const auto& m = world_to_local;
@@ -41,18 +28,15 @@ Result<InstanceRecord> make_instance(uint32_t asset, const mat4x3& local_to_worl
   const auto invalid = [](const char* why) {
     return make_error(ErrorCode::InvalidArgument, fmt::format("the instance's transform {}", why));
   };
-  const glm::dmat3 linear = linear_part(local_to_world);
-  const glm::dvec3 translation(local_to_world[3]);
-  if (!is_in_range(linear) || !is_in_range(translation)) return invalid("is not finite, or beyond 1.8e18");
-  const double determinant = glm::determinant(linear);
-  const glm::dmat3 inverse = glm::inverse(linear);
-  const glm::dvec3 back = -(inverse * translation);
-  if (determinant == 0.0 || !is_in_range(inverse) || !is_in_range(back)) {
+  const glm::dmat4x3 to_world(local_to_world);
+  if (!is_in_range(to_world)) return invalid("is not finite, or beyond 1.8e18");
+  const glm::dmat4x3 to_local = inverse_of(to_world);
+  if (glm::determinant(glm::dmat3(to_world)) == 0.0 || !is_in_range(to_local)) {
     return invalid("cannot be inverted: give every axis a length that is not zero");
   }
   InstanceRecord record;
   record.asset = asset;
-  record.set_inverse(inverse, back);
+  record.set_inverse(glm::dmat3(to_local), to_local[3]);
   return record;
 }
 
@@ -88,9 +72,7 @@ Box3 instance_bounds(const InstanceRecord& instance, const TracedAsset& asset) {
     for (int i = 0; i < 8; ++i) extend(asset.bounds.corner(i));
   }
   for (const vec3& p : asset.hull) extend(p);
-  const float far = std::max(max_component(glm::abs(bounds.lower)), max_component(glm::abs(bounds.upper)));
-  const vec3 pad(kRelativePad * (max_component(bounds.size()) + far));
-  return {bounds.lower - pad, bounds.upper + pad};
+  return padded_for_local_rays(bounds);
 }
 
 }  // namespace farfield

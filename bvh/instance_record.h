@@ -4,7 +4,6 @@
 
 #include <cstdint>
 
-#include "base/float4.h"
 #include "base/result.h"
 #include "base/vec.h"
 #include "bvh/level_choice.h"
@@ -25,9 +24,6 @@ struct alignas(64) InstanceRecord {
   vec3 vector_to_local(const vec3& v) const {
     return world_to_local[0] * v.x + world_to_local[1] * v.y + world_to_local[2] * v.z;
   }
-  /// The same of the first three lanes; the fourth is anything.
-  Float4 point_to_local(const Float4& p) const { return transform_point(world_to_local, p); }
-  Float4 vector_to_local(const Float4& v) const { return transform_vector(world_to_local, v); }
   /// World-space normal of a local one, up to scale: transpose(W2L) n; flips under mirroring like a flattened mesh's.
   vec3 normal_to_world(const vec3& n) const;
   /// The linear part of world_to_local.

@@ -22,7 +22,7 @@ Result<LevelScene> LevelScene::build(BvhDevice& device, const LevelView& level, 
     FARFIELD_TRY_LET(auto parts, PartScenes::build(device, level, terms, filter, user));
     result.parts_ = std::make_unique<PartScenes>(std::move(parts));
     result.most_held_before_ = result.parts_->most_held_bytes();
-    left.most_bytes -= std::min(left.most_bytes, result.parts_->bytes());
+    left = terms.after(result.parts_->bytes());
   }
   const auto make = [&] {
     std::vector<EmbreeGeometry> geometries(1);

@@ -14,10 +14,6 @@ namespace farfield {
 
 namespace {
 
-// Bounds of a place grow by this fraction of their size and of their distance from the origin: rays are transformed in
-// floats.
-constexpr float kRelativePad = 1e-6f;
-
 std::vector<vec3> points_of(const LevelView& level, uint32_t part) {
   std::vector<vec3> points;
   for (const uint32_t v : part_vertices(level, part)) points.push_back(level.positions[v]);
@@ -29,14 +25,7 @@ Box3 bounds_of(const PartPlacement& placement, const std::vector<vec3>& points) 
   const glm::dmat4x3 transform = to_level(placement);
   Box3 bounds;
   for (const vec3& p : points) bounds.extend(vec3(transform * glm::dvec4(p, 1.0)));
-  const float far = std::max(max_component(glm::abs(bounds.lower)), max_component(glm::abs(bounds.upper)));
-  const vec3 pad(kRelativePad * (max_component(bounds.size()) + far));
-  return {bounds.lower - pad, bounds.upper + pad};
-}
-
-/// What is left of the terms after so many bytes.
-LoadTerms terms_after(const LoadTerms& terms, uint64_t bytes) {
-  return {terms.most_bytes - std::min(terms.most_bytes, bytes), terms.cancel};
+  return padded_for_local_rays(bounds);
 }
 
 }  // namespace
@@ -64,7 +53,7 @@ Result<PartScenes> PartScenes::build(BvhDevice& device, const LevelView& level, 
     };
     const std::string what = fmt::format("the BVH of {} quads of part {}", quads.size(), part);
     FARFIELD_TRY_LET(MeasuredScene built,
-                     build_measured_scene(device, make, terms_after(terms, parts.bytes_), what, part + 1));
+                     build_measured_scene(device, make, terms.after(parts.bytes_), what, part + 1));
     parts.scenes_.push_back(std::move(built.scene));
     parts.most_held_bytes_ = std::max(parts.most_held_bytes_, parts.bytes_ + built.bytes + built.build_peak_bytes);
     parts.bytes_ += built.bytes + sizeof(EmbreeScene);

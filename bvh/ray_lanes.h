@@ -2,10 +2,12 @@
 // A ray of Embree's, put into another space and back.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 
 #include "base/embree.h"
 #include "base/float4.h"
+#include "base/vec.h"
 
 namespace farfield {
 
@@ -25,6 +27,15 @@ struct RayLanes {
 };
 static_assert(offsetof(EmbreeRay, tnear) == 3 * sizeof(float) && offsetof(EmbreeRay, dir_x) == 4 * sizeof(float) &&
               offsetof(EmbreeRay, time) == 7 * sizeof(float));
+
+/// Bounds of what such rays look for in a space of its own, as a ray meets them before it is put there: larger by the
+/// rounding of the transform, a few times 2^-24 of the coordinates that it adds up.
+inline Box3 padded_for_local_rays(const Box3& bounds) {
+  constexpr float kRelativePad = 1e-6f;  // of their size and of their distance from the origin
+  const float far = std::max(max_component(glm::abs(bounds.lower)), max_component(glm::abs(bounds.upper)));
+  const vec3 pad(kRelativePad * (max_component(bounds.size()) + far));
+  return {bounds.lower - pad, bounds.upper + pad};
+}
 
 /// Puts a ray into a space, and back at the end of the scope.
 class InSpace {

@@ -277,14 +277,14 @@ bool contains(const Box3& box, const vec3& p) {  // false for NaN
 
 /// Those of parts are in spaces of their own: what rays can trace is all that is asked of them.
 Problem check_positions(const LevelView& level) {
-  std::vector<bool> is_of_part(level.positions.size());
+  std::vector<bool> is_of_part(level.has_parts() ? level.positions.size() : 0);
   for (size_t i = level.own_quad_count(); i < level.quads.size(); ++i) {
     const Quad& quad = level.quads[i];
     for (const uint32_t v : {quad.v0, quad.v1, quad.v2, quad.v3}) is_of_part[v] = true;
   }
   const Box3 anywhere{vec3(-kEmbreeLargest), vec3(kEmbreeLargest)};
   const auto outside = [&](const vec3& p) {
-    const bool is_placed = is_of_part[static_cast<size_t>(&p - level.positions.data())];
+    const bool is_placed = level.has_parts() && is_of_part[static_cast<size_t>(&p - level.positions.data())];
     return !contains(is_placed ? anywhere : level.header.bounds, p);
   };
   const auto found = std::ranges::find_if(level.positions, outside);

@@ -40,8 +40,6 @@ LevelStats level_stats(const LevelView& level) {
   stats.vertices = level.positions.size();
   stats.quads = level.quads.size();
   stats.faces = face_count(level);
-  stats.parts = level.part_first_quad.size();
-  stats.placements = level.placements.size();
   stats.paired_faces = ratio(2.0 * static_cast<double>(stats.faces - stats.quads), static_cast<double>(stats.faces), 0);
   stats.grid = level.header.brick_dims * kBrickSide;
   stats.bricks = level.bricks.size();

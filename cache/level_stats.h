@@ -21,9 +21,8 @@ struct LevelStats {
   uint64_t vertices = 0;
   uint64_t quads = 0;
   uint64_t faces = 0;
-  uint64_t parts = 0, placements = 0;  ///< what level 0 has once and shows in so many places
-  double paired_faces = 0;             ///< fraction of faces that share a quad with another: fewer, faster BVH leaves
-  ivec3 grid{0};                       ///< voxels along x, y, z that the brick table spans
+  double paired_faces = 0;  ///< fraction of faces that share a quad with another: fewer, faster BVH leaves
+  ivec3 grid{0};            ///< voxels along x, y, z that the brick table spans
   uint64_t bricks = 0;
   uint64_t voxels = 0;      ///< active
   double sparsity = 0;      ///< fraction of the grid's voxels that are empty; 1 without volume

@@ -2,57 +2,17 @@
 #include "cache/placed_parts.h"
 
 #include <algorithm>
-#include <cmath>
 
-#include "base/index.h"
+#include "base/index_map.h"
 #include "cache/level_format.h"
 
 namespace farfield {
 
 namespace {
 
-glm::dmat3 linear_part(const mat4x3& m) { return {glm::dvec3(m[0]), glm::dvec3(m[1]), glm::dvec3(m[2])}; }
-
-bool is_in_range(const glm::dvec3& v) {
-  return glm::all(glm::lessThanEqual(glm::abs(v), glm::dvec3(double{kEmbreeLargest})));  // false for NaN
-}
-
-bool is_in_range(const glm::dmat4x3& m) {
-  return is_in_range(m[0]) && is_in_range(m[1]) && is_in_range(m[2]) && is_in_range(m[3]);
-}
-
-/// Numbers of copies: in each round everything is copied at most once.
-class Numbers {
- public:
-  explicit Numbers(size_t count) : number_(count, kNoIndex) {}
-
-  void start_anew() {
-    for (const uint32_t i : used_) number_[i] = kNoIndex;
-    used_.clear();
-  }
-  /// The number of i; add() gives the first one of a round.
-  template <typename Add>
-  uint32_t of(uint32_t i, const Add& add) {
-    if (number_[i] == kNoIndex) {
-      number_[i] = add();
-      used_.push_back(i);
-    }
-    return number_[i];
-  }
-
- private:
-  std::vector<uint32_t> number_, used_;
-};
-
 class Flattener {
  public:
-  explicit Flattener(const LevelView& level)
-      : level_(level),
-        vertices_(level.positions.size()),
-        shading_vertices_(
-            std::max({level.shading_normal.size(), level.shading_uv.size(), level.shading_color.size()})) {
-    flat_.header = level.header;
-  }
+  explicit Flattener(const LevelView& level) : level_(level) { flat_.header = level.header; }
 
   LevelData run() {
     add(0, level_.own_quad_count(), glm::dmat4x3(1.0), glm::dmat3(1.0), 0);
@@ -67,8 +27,10 @@ class Flattener {
  private:
   void add(uint32_t first, uint32_t end, const glm::dmat4x3& transform, const glm::dmat3& of_normals,
            uint32_t source_face_offset) {
-    vertices_.start_anew();
-    shading_vertices_.start_anew();
+    first_vertex_ += static_cast<uint32_t>(vertices_.size());
+    first_shading_vertex_ += static_cast<uint32_t>(shading_vertices_.size());
+    vertices_.clear();
+    shading_vertices_.clear();
     for (uint32_t q = first; q < end; ++q) {
       const Quad& quad = level_.quads[q];
       const auto vertex = [&](uint32_t v) { return placed_vertex(v, transform); };
@@ -82,10 +44,9 @@ class Flattener {
   }
 
   uint32_t placed_vertex(uint32_t v, const glm::dmat4x3& transform) {
-    return vertices_.of(v, [&] {
-      flat_.positions.emplace_back(transform * glm::dvec4(level_.positions[v], 1.0));
-      return static_cast<uint32_t>(flat_.positions.size() - 1);
-    });
+    const auto [index, is_new] = vertices_.insert(v);
+    if (is_new) flat_.positions.emplace_back(transform * glm::dvec4(level_.positions[v], 1.0));
+    return first_vertex_ + index;
   }
 
   void add_face(uint32_t face, const glm::dmat3& of_normals, uint32_t source_face_offset) {
@@ -101,29 +62,28 @@ class Flattener {
   }
 
   uint32_t shading_vertex(uint32_t v, const glm::dmat3& of_normals) {
-    return shading_vertices_.of(v, [&] {
-      if (!level_.shading_normal.empty()) {
-        const glm::dvec3 normal(unpack_normal(level_.shading_normal[v]));
-        flat_.shading_normal.push_back(pack_normal(vec3(glm::normalize(of_normals * normal))));
-      }
-      if (!level_.shading_uv.empty()) flat_.shading_uv.push_back(level_.shading_uv[v]);
-      if (!level_.shading_color.empty()) flat_.shading_color.push_back(level_.shading_color[v]);
-      return shading_count_++;
-    });
+    const auto [index, is_new] = shading_vertices_.insert(v);
+    if (is_new) add_shading_vertex(v, of_normals);
+    return first_shading_vertex_ + index;
+  }
+
+  void add_shading_vertex(uint32_t v, const glm::dmat3& of_normals) {
+    if (!level_.shading_normal.empty()) {
+      const glm::dvec3 normal(unpack_normal(level_.shading_normal[v]));
+      flat_.shading_normal.push_back(pack_normal(vec3(glm::normalize(of_normals * normal))));
+    }
+    if (!level_.shading_uv.empty()) flat_.shading_uv.push_back(level_.shading_uv[v]);
+    if (!level_.shading_color.empty()) flat_.shading_color.push_back(level_.shading_color[v]);
   }
 
   const LevelView& level_;
   LevelData flat_;
-  uint32_t faces_ = 0, shading_count_ = 0;
-  Numbers vertices_, shading_vertices_;
+  uint32_t faces_ = 0;
+  uint32_t first_vertex_ = 0, first_shading_vertex_ = 0;  ///< of the place at hand
+  IndexMap vertices_, shading_vertices_;                  ///< those of its part that it has so far
 };
 
 }  // namespace
-
-glm::dmat4x3 inverse_of(const glm::dmat4x3& transform) {
-  const glm::dmat3 linear = glm::inverse(glm::dmat3(transform[0], transform[1], transform[2]));
-  return {linear[0], linear[1], linear[2], -(linear * transform[3])};
-}
 
 bool can_be_undone(const mat4x3& transform) {
   return is_in_range(glm::dmat4x3(transform)) && glm::determinant(linear_part(transform)) != 0 &&

@@ -5,13 +5,12 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/affine.h"
 #include "base/vec.h"
 #include "cache/level.h"
 
 namespace farfield {
 
-/// The inverse of an affine transform whose determinant is not 0.
-glm::dmat4x3 inverse_of(const glm::dmat4x3& transform);
 /// Whether a transform is finite and has an inverse that is, within what rays can be traced in.
 bool can_be_undone(const mat4x3& transform);
 /// From the part's space to the level's, of a transform that can_be_undone().

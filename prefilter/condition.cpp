@@ -122,8 +122,9 @@ struct TriangleKeyHash {
 /// Appends the triangles of the mesh's polygons to a surface that has their vertices.
 class Triangulation {
  public:
-  Triangulation(SourceMesh& mesh, const WeldResult& welded, SourceSurface& surface)
-      : mesh_(mesh), welded_(welded), surface_(surface) {}
+  /// place: per face, or empty.
+  Triangulation(SourceMesh& mesh, const WeldResult& welded, const std::vector<uint32_t>& place, SourceSurface& surface)
+      : mesh_(mesh), welded_(welded), place_(place), surface_(surface) {}
 
   void run(const std::vector<uint32_t>& source_face, const Job& job) {
     for (size_t face = 0; face < mesh_.face_count() && !job.is_cancelled(); ++face) add_face(face, source_face[face]);
@@ -134,8 +135,6 @@ class Triangulation {
           fmt::format("{} triangles repeat an earlier one with the same corners; dropped", repeated_));
     }
   }
-
-  const std::vector<uint32_t>& face_of_triangle() const { return face_of_triangle_; }  ///< of the mesh
 
  private:
   void add_face(size_t face, uint32_t source_face) {
@@ -163,7 +162,7 @@ class Triangulation {
     }
     surface_.material.push_back(mesh_.face_material[face]);
     surface_.source_face.push_back(source_face);
-    face_of_triangle_.push_back(static_cast<uint32_t>(face));
+    if (!place_.empty()) surface_.placement.push_back(place_[face]);
     add_corners(corner, mesh_.corner_uv, surface_.corner_uv);
     add_corners(corner, mesh_.corner_color, surface_.corner_color);
     add_corners(corner, mesh_.corner_normal, surface_.corner_normal);
@@ -189,11 +188,11 @@ class Triangulation {
 
   SourceMesh& mesh_;
   const WeldResult& welded_;
+  const std::vector<uint32_t>& place_;
   SourceSurface& surface_;
   std::unordered_set<uvec3, TriangleKeyHash> seen_;
   size_t degenerate_ = 0, repeated_ = 0;
   uint32_t quads_ = 0;
-  std::vector<uint32_t> face_of_triangle_;
   std::vector<uint32_t> corners_;
   std::vector<dvec3> points_;
 };
@@ -263,15 +262,14 @@ std::vector<uint32_t> places_of_faces(const SourceMesh& mesh, const std::vector<
   return places;
 }
 
-/// Says of each triangle in which place it is. place: per face of the mesh.
-void add_placements(const SourceMesh& mesh, const std::vector<uint32_t>& place,
-                    const std::vector<uint32_t>& face_of_triangle, SourceSurface& surface) {
-  if (place.empty()) return;
-  for (const uint32_t face : face_of_triangle) surface.placement.push_back(place[face]);
+/// To positions relative to the origin.
+std::vector<SurfacePlacement> placements_from(const SourceMesh& mesh, const dvec3& origin) {
+  std::vector<SurfacePlacement> placements;
   for (const SourcePlacement& from : mesh.placements) {
-    surface.placements.push_back({from.mesh, from.to_asset});
-    surface.placements.back().to_surface[3] -= surface.origin;
+    placements.push_back({from.mesh, from.to_asset});
+    placements.back().to_surface[3] -= origin;
   }
+  return placements;
 }
 
 Result<ImportedAsset> condition_mesh(SourceMesh& mesh, const std::string& name, const Job& job) {
@@ -296,13 +294,12 @@ Result<ImportedAsset> condition_mesh(SourceMesh& mesh, const std::string& name, 
   SourceSurface& surface = asset.source;
   surface.origin = origin;
   surface.positions = std::move(welded.positions);
+  if (!place.empty()) surface.placements = placements_from(mesh, origin);
   surface.materials = std::move(mesh.materials);
   surface.material_function = std::move(mesh.material_function);
   surface.material_batch = std::move(mesh.material_batch);
-  Triangulation triangulation(mesh, welded, surface);
-  triangulation.run(source_face, job);
+  Triangulation(mesh, welded, place, surface).run(source_face, job);
   if (job.is_cancelled()) return cancelled();
-  add_placements(mesh, place, triangulation.face_of_triangle(), surface);
   if (surface.triangles.empty()) {
     return make_error(ErrorCode::BadFile, fmt::format("{}: no face has any area", name));
   }

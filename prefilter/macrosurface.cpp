@@ -11,10 +11,10 @@
 #include <utility>
 
 #include "base/index.h"
+#include "base/index_map.h"
 #include "base/parallel.h"
 #include "prefilter/edge_table.h"
 #include "prefilter/gentle_slopes.h"
-#include "prefilter/index_map.h"
 #include "prefilter/surface_patches.h"
 
 namespace farfield {

@@ -82,8 +82,7 @@ Result<LoadedItem> load_level(const OpenAsset& asset, uint32_t slot, const std::
   FARFIELD_TRY(check_level(view, asset, slot, path));
   const SurfaceLook* look = view.header.level == 0 ? asset.close_up.get() : nullptr;
   const uint64_t file_bytes = level_file_sizes(view).memory_bytes;  // at most most_bytes, by check_planned_bytes()
-  const LoadTerms build{terms.most_bytes - std::min(terms.most_bytes, file_bytes), terms.cancel};
-  auto traced = TracedLevel::build(device, view, slot, look, build);
+  auto traced = TracedLevel::build(device, view, slot, look, terms.after(file_bytes));
   if (!traced) {
     return make_error(
         traced.error().code,

@@ -154,7 +154,7 @@ def branches(rng, lines, radii, child, scale):
 
 
 def skeleton(mesh, rng, orders, scale, bark):
-    """Bark of all orders; returns the twigs. All orders but the trunk thin out with the scale."""
+    """Bark of all orders; returns the twigs and their radii. All orders but the trunk thin out with the scale."""
     trunk = orders[0]
     one = np.ones(trunk.get("stems", 1))
     angle = 2 * math.pi * np.arange(len(one)) / len(one)
@@ -164,7 +164,7 @@ def skeleton(mesh, rng, orders, scale, bark):
     for order in orders[1:]:
         lines, radii = branches(rng, lines, radii, order, scale ** (1 / (len(orders) - 1)))
         mesh.tubes(bark, lines, radii, order["sides"])
-    return lines
+    return lines, radii
 
 
 def on_twigs(rng, twigs, per_twig, first=0.1):
@@ -210,7 +210,7 @@ def tree(orders, bark, clothe, *how, **more):
     """clothe: what puts leaves or needles on twigs."""
     def make(rng, scale):
         mesh = Mesh()
-        twigs = skeleton(mesh, rng, orders, scale, bark)
+        twigs, _ = skeleton(mesh, rng, orders, scale, bark)
         clothe(mesh, rng, twigs, *how, **more)
         return mesh
     return make

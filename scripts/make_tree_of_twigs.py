@@ -48,50 +48,40 @@ def places(rng, lines, radii, order, scale):
 
 def build(folder, scale, trees):
     folder.mkdir(parents=True, exist_ok=True)
-    rng, orders = np.random.default_rng(7), forest.OAK
-    bark = forest.Mesh()
-    thinned = scale ** (1 / (len(orders) - 1))
-    lines, radii = forest.grow(rng, np.array([[0.0, -0.1, 0.0]]), np.array([[0.0, 1.0, 0.0]]), np.array([orders[0]["length"]]),
-                               np.array([orders[0]["radius"]]), orders[0])
-    bark.tubes("oak bark", lines, radii, orders[0]["sides"])
-    for order in orders[1:-1]:
-        lines, radii = forest.branches(rng, lines, radii, order, thinned)
-        bark.tubes("oak bark", lines, radii, order["sides"])
-    transforms = places(rng, lines, radii, orders[-1], thinned)
+    rng, (*boughs, last) = np.random.default_rng(7), forest.OAK
+    bark, thinned = forest.Mesh(), scale ** (1 / len(boughs))  # per order
+    lines, radii = forest.skeleton(bark, rng, boughs, thinned ** (len(boughs) - 1), "oak bark")
+    transforms = places(rng, lines, radii, last, thinned)
 
-    document, nodes = forest.Document(folder), []
+    document, triangles = forest.Document(folder), bark.triangles()
     document.json["extensionsUsed"] = ["EXT_mesh_gpu_instancing", "KHR_materials_diffuse_transmission"]
-    meshes = [("bark", bark)] + [("twig_%d" % k, twig(np.random.default_rng([8, k]), orders[-1])) for k in range(KINDS)]
-    for name, mesh in meshes:
-        parts = list(mesh.merged())
-        with open(folder / (name + ".bin"), "wb") as out:
-            for _, points, indices in parts:
-                points.tofile(out)
-                indices.tofile(out)
-        nodes.append({"name": name, "mesh": document.add_mesh(name, parts)})
+    nodes = document.json["nodes"]
+    nodes.append({"name": "bark", "mesh": forest.write_mesh(folder, document, "bark", bark)[0]})
     buffer = document.buffer("places.bin")
     with open(folder / "places.bin", "wb") as out:
         for kind in range(KINDS):
-            attributes = {}
-            for key, values in zip(("TRANSLATION", "ROTATION", "SCALE"), transforms):
-                values = values[kind::KINDS].astype(np.float32)
-                attributes[key] = document.accessor(buffer, values)
-                values.tofile(out)
-            nodes[1 + kind]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": attributes}}
-    columns = max(1, math.isqrt(trees))
-    for tree in range(trees):
-        at = [14.0 * (tree % columns), 0.0, -14.0 * (tree // columns)]
-        first = len(document.json["nodes"])
-        document.json["nodes"] += [dict(node) for node in nodes]
-        document.json["nodes"].append({"name": "oak", "translation": at, "extras": {"farfield_asset": True},
-                                       "children": list(range(first, first + len(nodes)))})
+            mesh, name = twig(np.random.default_rng([8, kind]), last), "twig_%d" % kind
+            index, _ = forest.write_mesh(folder, document, name, mesh)
+            of_kind = [values[kind::KINDS] for values in transforms]
+            forest.add_instances(document, buffer, out, name, index, of_kind)
+            triangles += len(of_kind[0]) * mesh.triangles()
+    add_trees(document, trees)
+    nodes.append({"name": "under the crown", "camera": 0, "translation": [1.0, 5.0, 7.0]})
     document.json["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.7, "aspectRatio": 16 / 9, "znear": 0.01}}]
-    document.json["nodes"].append({"name": "under the crown", "camera": 0, "translation": [1.0, 5.0, 7.0]})
     document.write("oak_of_twigs.gltf")
-    placed = len(transforms[0])
-    triangles = bark.triangles() + sum(len(transforms[0][k::KINDS]) * meshes[1 + k][1].triangles() for k in range(KINDS))
     print("%s: %d twigs of %s triangles, bark %d: %d triangles in all places" % (
-        folder / "oak_of_twigs.gltf", placed, meshes[1][1].triangles(), bark.triangles(), triangles))
+        folder / "oak_of_twigs.gltf", len(transforms[0]), mesh.triangles(), bark.triangles(), triangles))
+
+
+def add_trees(document, trees):
+    """Rows of trees of the nodes that there are, which become the first one's."""
+    nodes = document.json["nodes"]
+    of_tree, columns = list(nodes), max(1, math.isqrt(trees))
+    for tree in range(trees):
+        if tree > 0:
+            nodes += [dict(node) for node in of_tree]
+        nodes.append({"name": "oak", "translation": [14.0 * (tree % columns), 0.0, -14.0 * (tree // columns)],
+                      "extras": {"farfield_asset": True}, "children": list(range(len(nodes) - len(of_tree), len(nodes)))})
 
 
 def main():

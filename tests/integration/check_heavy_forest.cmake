@@ -1,17 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 # scripts/make_heavy_forest.py: the same files every time, and a scene that is read without a warning. Variables: script,
 # tool, work.
+include(${CMAKE_CURRENT_LIST_DIR}/run_generator.cmake)
 file(REMOVE_RECURSE ${work})
 foreach(run first second)
-  execute_process(COMMAND ${script} ${work}/${run} --scale 0.002 --instances 200 --variants 1 --only birch,spruce,fern,brig
-                  RESULT_VARIABLE result ERROR_VARIABLE error OUTPUT_QUIET)
-  if(error MATCHES "No module named 'numpy'")
-    message("skipped: there is no numpy")
-    return()
-  endif()
-  if(NOT result EQUAL 0)
-    message(FATAL_ERROR "make_heavy_forest.py failed: ${error}")
-  endif()
+  run_generator(${script} ${work}/${run} --scale 0.002 --instances 200 --variants 1 --only birch,spruce,fern,brig)
 endforeach()
 file(GLOB files RELATIVE ${work}/first ${work}/first/*)
 foreach(file ${files})

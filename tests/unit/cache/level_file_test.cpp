@@ -232,12 +232,16 @@ TEST(LevelFormat, GoldenBytesOfVersion8AreFrozen) {
   expect_frozen("/format_v8/level_3.ffl", 4352u, test::full_level_of_version_8());
 }
 
+/// What is wrong with a spoilt level, in structure or values; empty: nothing.
+std::string problem_of(LevelData level, const std::function<void(LevelData&)>& spoil) {
+  spoil(level);
+  const auto in_structure = find_structure_problem(view_of(level));
+  return in_structure ? *in_structure : find_value_problem(view_of(level)).value_or("");
+}
+
 TEST(LevelFormat, PlacesOfPartsAreChecked) {
   const auto problem = [](const std::function<void(LevelData&)>& spoil) {
-    LevelData level = test::full_level_of_version_8();
-    spoil(level);
-    const auto in_structure = find_structure_problem(view_of(level));
-    return in_structure ? *in_structure : find_value_problem(view_of(level)).value_or("");
+    return problem_of(test::full_level_of_version_8(), spoil);
   };
   EXPECT_EQ(problem([](LevelData&) {}), "");
   EXPECT_EQ(problem([](LevelData& l) { l.placements.clear(); }), "part_first_quad and placements do not go together");
@@ -291,10 +295,7 @@ TEST(LevelFormat, ShapesOfSheetsNeedGaps) {
 
 TEST(LevelFormat, FogHasNothingOfFlakesAndFlakesNothingOfFog) {
   const auto problem = [](const std::function<void(LevelData&)>& spoil) {
-    LevelData level = test::full_level_of_version_6();
-    spoil(level);
-    const auto in_structure = find_structure_problem(view_of(level));
-    return in_structure ? *in_structure : find_value_problem(view_of(level)).value_or("");
+    return problem_of(test::full_level_of_version_6(), spoil);
   };
   EXPECT_EQ(problem([](LevelData&) {}), "");
   EXPECT_EQ(problem([](LevelData& l) { l.voxel_diffuse.resize(5); }), "its fog has properties of flakes");
