@@ -97,7 +97,7 @@ std::vector<uint32_t> part_vertices(const LevelView& level, uint32_t part) {
     vertices.insert(vertices.end(), {quad.v0, quad.v1, quad.v2, quad.v3});
   }
   std::ranges::sort(vertices);
-  vertices.erase(std::ranges::unique(vertices).begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
   return vertices;
 }
 

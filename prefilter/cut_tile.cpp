@@ -32,8 +32,8 @@ size_t part_faces(const SourceSurface& surface, std::span<uint32_t> faces, size_
   const auto is_before = [&](uint32_t a, uint32_t b) { return std::pair(key(a), a) < std::pair(key(b), b); };
   std::ranges::nth_element(faces, faces.begin() + static_cast<std::ptrdiff_t>(wanted), is_before);
   const float limit = key(faces[wanted]);
-  const auto rest = std::ranges::partition(faces, [&](uint32_t face) { return key(face) < limit; });
-  const size_t before = faces.size() - rest.size();
+  const auto rest = std::partition(faces.begin(), faces.end(), [&](uint32_t face) { return key(face) < limit; });
+  const auto before = static_cast<size_t>(rest - faces.begin());
   if (before > 0) return before;
   std::ranges::nth_element(faces, faces.begin() + static_cast<std::ptrdiff_t>(wanted), is_before);  // all in one row
   return wanted;
