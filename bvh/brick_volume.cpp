@@ -22,16 +22,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "base/hash.h"
+#include "base/nonfinite.h"
 #include "base/split_mix.h"
 
 namespace farfield {
 
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // Six-byte matrices have eigenvalues up to 1 + 1/127 (docs/theory.md, section 10.10), so sigma may reach its square
 // root.
 constexpr float kSigmaBound = 1.00393f;

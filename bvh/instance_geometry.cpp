@@ -17,12 +17,12 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <numeric>
 
 #include "base/check.h"
 #include "base/hash.h"
 #include "base/just_behind.h"
+#include "base/nonfinite.h"
 #include "bvh/ray_lanes.h"
 #include "bvh/traced_morph.h"
 
@@ -30,7 +30,6 @@ namespace farfield {
 
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // How much the range in which a ray meets an instance's local bounds is widened: rounding of the slab test.
 constexpr float kRangePad = 1e-6f;
 

@@ -7,10 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <vector>
 
+#include "base/nonfinite.h"
 #include "base/random.h"
 #include "bvh/brick_volume.h"
 
@@ -19,7 +19,6 @@ namespace farfield {
 namespace {
 
 constexpr int kRays = 1 << 12;  // of each kind
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 // Least squares over the levels of five trees and two grounds (docs/results/speed.md); quads go with boxes.
 constexpr double kRay = 55, kBox = 6, kQuad = 1, kBrick = 21, kVoxel = 12.5, kCollision = 66;

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
+#include "base/nonfinite.h"
 #include "cache/placed_parts.h"
 
 namespace farfield {
@@ -13,7 +13,6 @@ namespace farfield {
 namespace {
 
 constexpr size_t kDirections = 64;
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// How far something reaches along each direction.
 class Reach {

@@ -23,7 +23,7 @@ constexpr uint64_t kMaxManifestBytes = uint64_t{4} << 20;
 constexpr size_t kMaxLevels = 64;  // each level halves the resolution: no double has more
 constexpr size_t kMaxHullPoints = 1 << 13;
 constexpr uint64_t kMaxBytes = uint64_t{1} << 50;
-constexpr uint64_t kMaxElements = uint64_t{1} << 32;
+constexpr uint64_t kMaxElementsOfLevel = uint64_t{1} << 32;
 constexpr size_t kMaxSourceFiles = 1 << 13;
 constexpr size_t kMaxWarnings = 64;
 constexpr int kMaxDepth = 16;  // of nesting; ours is 5
@@ -63,7 +63,7 @@ Problem find_level_problem(const LevelEntry& level) {
     if (bytes > kMaxBytes) return fmt::format("{} bytes are more than any level has", bytes);
   }
   for (const uint64_t count : {level.triangles, level.placements, level.voxels, level.bricks}) {
-    if (count > kMaxElements) return fmt::format("{} elements are more than any level has", count);
+    if (count > kMaxElementsOfLevel) return fmt::format("{} elements are more than any level has", count);
   }
   if (!std::isfinite(level.ray_cost) || level.ray_cost < 0) return "its ray_cost is negative or not finite";
   if (level.errors) {

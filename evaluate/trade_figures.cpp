@@ -4,15 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 
+#include "base/nonfinite.h"
 #include "base/result.h"
 
 namespace farfield {
 namespace {
 
 constexpr size_t kRgba = 4;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 bool touches(std::span<const Image> parts, size_t pixel) {
   return std::ranges::any_of(parts, [&](const Image& part) {

@@ -11,16 +11,15 @@ namespace {
 
 using tinygltf::Model;
 
-constexpr const char* kInstancing = "EXT_mesh_gpu_instancing";
 constexpr double kLargestId = 9007199254740992.0;  // 2^53: up to there doubles are exact
 
 std::string place_of_instancing(const tinygltf::Node& node) {
-  return fmt::format("node {} ({})", node.name, kInstancing);
+  return fmt::format("node {} ({})", node.name, kInstancingExtension);
 }
 
 /// The accessor of an attribute of EXT_mesh_gpu_instancing; -1: the file does not give the attribute.
 Result<int> attribute_accessor(const GltfDocument& document, const tinygltf::Node& node, const char* name) {
-  const auto extension = node.extensions.find(kInstancing);
+  const auto extension = node.extensions.find(kInstancingExtension);
   if (extension == node.extensions.end() || !extension->second.Has("attributes")) return -1;
   const tinygltf::Value& attributes = extension->second.Get("attributes");
   if (!attributes.IsObject() || !attributes.Has(name)) return -1;
@@ -173,7 +172,7 @@ Result<std::optional<SkinPlace>> skin_place(const GltfDocument& document, const 
 }
 
 Result<std::vector<glm::dmat4>> instance_transforms(const GltfDocument& document, const tinygltf::Node& node) {
-  if (!node.extensions.contains(kInstancing)) return std::vector<glm::dmat4>{glm::dmat4(1.0)};
+  if (!node.extensions.contains(kInstancingExtension)) return std::vector<glm::dmat4>{glm::dmat4(1.0)};
   const auto place = place_of_instancing(node);
   FARFIELD_TRY_LET(const auto translations, read_attribute(document, node, "TRANSLATION", 3));
   FARFIELD_TRY_LET(const auto rotations, read_attribute(document, node, "ROTATION", 4));

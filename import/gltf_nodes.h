@@ -12,6 +12,8 @@
 
 namespace farfield {
 
+inline constexpr const char* kInstancingExtension = "EXT_mesh_gpu_instancing";
+
 /// The nodes of the default scene in depth-first order, parents first. Without a scene: all nodes that are no children.
 std::vector<int> scene_nodes(const GltfDocument& document);
 

@@ -6,6 +6,7 @@
 
 #include "base/hash.h"
 #include "import/gltf_json.h"
+#include "import/gltf_nodes.h"
 #include "import/read_file.h"
 
 namespace farfield {
@@ -15,7 +16,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 constexpr const char* kVisibility = "KHR_node_visibility";
-constexpr const char* kInstancing = "EXT_mesh_gpu_instancing";
 // Views of hostile files overlap: no more than so many times its bytes are hashed of a buffer.
 constexpr uint64_t kMostOverlap = 16;
 
@@ -206,8 +206,9 @@ void GltfParts::add_node(Json node, bool is_root) {
   if (is_root)
     for (const char* of_instances : {"translation", "rotation", "scale", "matrix"}) node.erase(of_instances);
   Json attributes;
-  if (node.contains("extensions") && node["extensions"].is_object() && node["extensions"].contains(kInstancing))
-    attributes = take(node["extensions"][kInstancing], "attributes");
+  if (node.contains("extensions") && node["extensions"].is_object() &&
+      node["extensions"].contains(kInstancingExtension))
+    attributes = take(node["extensions"][kInstancingExtension], "attributes");
   add(node);
   if (!mesh.is_null()) add_mesh(mesh);
   if (!attributes.is_object()) return;

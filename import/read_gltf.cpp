@@ -240,10 +240,10 @@ class MaterialReader {
   }
 
   void set_emission(const tinygltf::Material& source, SourceMaterial& out, UvSource& uv) {
-    constexpr double kBrightest = 1e9;
+    constexpr double kBrightestGlow = 1e9;
     double strength = 1;
     if (const Value* e = extension(source.extensions, "KHR_materials_emissive_strength")) {
-      strength = std::clamp(extension_number(*e, "emissiveStrength").value_or(1.0), 0.0, kBrightest);
+      strength = std::clamp(extension_number(*e, "emissiveStrength").value_or(1.0), 0.0, kBrightestGlow);
     }
     for (size_t c = 0; c < std::min<size_t>(source.emissiveFactor.size(), 3); ++c) {
       out.emission[static_cast<int>(c)] = unit(source.emissiveFactor[c]) * static_cast<float>(strength);

@@ -50,7 +50,7 @@ int value_count(std::string_view option) {
   return 0;  // not an option of MTL
 }
 
-constexpr float kBrightest = 1e9f;  // of what glows
+constexpr float kBrightestGlow = 1e9f;  // of what glows
 
 class MtlReader {
  public:
@@ -85,7 +85,7 @@ class MtlReader {
     MtlMaterial& m = material();
     if (key == "kd") return read_color(rest, m.kd);
     if (key == "ks") return read_color(rest, m.ks);
-    if (key == "ke") return read_color(rest, m.ke, kBrightest);
+    if (key == "ke") return read_color(rest, m.ke, kBrightestGlow);
     if (key == "ns") return read_number(rest, m.ns);
     if (key == "tr") return read_number(rest, m.tr);
     if (key == "pr") return read_number(rest, m.pr);

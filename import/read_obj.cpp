@@ -305,8 +305,9 @@ class ObjReader {
     if (colors_.empty()) return;
     float most = 0;
     for (const vec3& color : colors_) most = std::max({most, color.x, color.y, color.z});
-    constexpr float kBrightest = 8;  // no colour up to 1 is above; what is 0 .. 255 with no more than this is black
-    const float white = most > kBrightest ? 255.0f : 1.0f;
+    constexpr float kBrightestFloat =
+        8;  // no colour up to 1 is above; what is 0 .. 255 with no more than this is black
+    const float white = most > kBrightestFloat ? 255.0f : 1.0f;
     if (white > 1) mesh_.warnings.push_back("vertex colours are 0 .. 255; read as such");
     for (vec3& color : colors_) {
       for (int c = 0; c < 3; ++c) color[c] = srgb_to_linear(std::min(color[c] / white, 1.0f));

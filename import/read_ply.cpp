@@ -93,8 +93,8 @@ struct Colors {
     for (const vec3& v : values) {
       for (int c = 0; c < 3; ++c) most = std::max(most, v[c]);  // NaN is never more
     }
-    constexpr float kBrightest = 8;  // no albedo as float is above; 0 .. 255 with no more than this is black
-    const bool is_linear = (type == PlyType::Float || type == PlyType::Double) && most <= kBrightest;
+    constexpr float kBrightestFloat = 8;  // no albedo as float is above; 0 .. 255 with no more than this is black
+    const bool is_linear = (type == PlyType::Float || type == PlyType::Double) && most <= kBrightestFloat;
     const float white = is_linear ? 1.0f : most <= 255 ? 255.0f : most <= 65535 ? 65535.0f : 4294967295.0f;
     if (white == 255 && most > 1 && size_of(type) > 1) note = "colours are 0 .. 255 in a wider type; read as such";
     std::vector<vec3> out(values.size());

@@ -8,10 +8,10 @@
 #include "path_tracer/integrator.h"
 
 #include <algorithm>
-#include <limits>
 #include <mutex>
 
 #include "base/hash.h"
+#include "base/nonfinite.h"
 #include "base/parallel.h"
 #include "path_tracer/scene_names.h"
 
@@ -20,7 +20,6 @@ namespace farfield {
 namespace {
 
 constexpr int kTileSide = 16;
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 // The power heuristic with exponent 2 for one sample of each kind.
 float power_weight(float pdf, float other_pdf) {

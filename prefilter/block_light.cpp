@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "base/hash.h"
+#include "base/nonfinite.h"
 #include "base/random.h"
 #include "scattering/albedo.h"
 
@@ -14,7 +14,6 @@ namespace farfield {
 namespace {
 
 constexpr uint32_t kMostEvents = 512;  ///< light that is in the block still leaves then; in both alike
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// A ray in voxels of the block; unit direction.
 struct Line {

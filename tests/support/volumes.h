@@ -34,6 +34,13 @@ inline SourceVolume make_volume(const ivec3& dims, double voxel_size,
   return volume;
 }
 
+/// Of a voxel of the grid; 0 in bricks that are not stored and at negative coordinates.
+inline float density_at(const SourceVolume& volume, const ivec3& voxel) {
+  if (glm::any(glm::lessThan(voxel, ivec3(0)))) return 0;
+  const uint32_t brick = volume.brick_at(voxel / kVolumeBrickSide);
+  return brick == kEmptyBrick ? 0.0f : volume.bricks[brick][index_in_brick(voxel)];
+}
+
 /// Smooth noise in [0, 1], about 6 voxels wide; the same in every run.
 inline double smooth_noise(const ivec3& v, double frequency = 1) {
   const dvec3 p = dvec3(v) * frequency;

@@ -19,7 +19,7 @@ BakeInput with(const BakeMaterial& material) {
   return input;
 }
 
-std::string error_of(const BakeMaterial& material, ErrorCode code = ErrorCode::InvalidArgument) {
+std::string error_of_material(const BakeMaterial& material, ErrorCode code = ErrorCode::InvalidArgument) {
   const auto gathered = gather_materials(with(material), 1);
   if (gathered) return "";
   EXPECT_EQ(gathered.error().code, code);
@@ -100,34 +100,34 @@ TEST(GatherMaterials, NamesTheMaterialAndTheFieldThatIsWrong) {
   BakeMaterial wrong;
   wrong.name = "bark";
   wrong.base_color.y = 1.5f;
-  EXPECT_EQ(error_of(wrong), "material 0 (bark): base_color is (0.8, 1.5, 0.8), not in [0, 1]");
+  EXPECT_EQ(error_of_material(wrong), "material 0 (bark): base_color is (0.8, 1.5, 0.8), not in [0, 1]");
   wrong = {};
   wrong.roughness = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_EQ(error_of(wrong), "material 0: roughness is nan, not in [0, 1]");
+  EXPECT_EQ(error_of_material(wrong), "material 0: roughness is nan, not in [0, 1]");
   wrong = {};
   wrong.emission.x = -1;
-  EXPECT_NE(error_of(wrong).find("emission is (-1, 0, 0)"), std::string::npos);
+  EXPECT_NE(error_of_material(wrong).find("emission is (-1, 0, 0)"), std::string::npos);
   wrong.emission.x = 1000;
-  EXPECT_EQ(error_of(wrong), "");
+  EXPECT_EQ(error_of_material(wrong), "");
   wrong.normal_scale = std::numeric_limits<float>::infinity();
-  EXPECT_NE(error_of(wrong).find("normal_scale"), std::string::npos);
+  EXPECT_NE(error_of_material(wrong).find("normal_scale"), std::string::npos);
 }
 
 TEST(GatherMaterials, NamesTheTextureThatIsWrong) {
   BakeMaterial wrong;
   wrong.normal_texture.file = "/nowhere/bumps.png";
-  const std::string missing = error_of(wrong, ErrorCode::NotFound);
+  const std::string missing = error_of_material(wrong, ErrorCode::NotFound);
   EXPECT_EQ(missing.rfind("material 0: normal_texture: ", 0), 0u) << missing;
   EXPECT_NE(missing.find("/nowhere/bumps.png"), std::string::npos) << missing;
 
   const std::vector<vec4> pixels = {{1, 1, 1, 1}, {0, 0, 2, 1}};
   wrong.normal_texture.pixels = pixels;
-  EXPECT_NE(error_of(wrong).find("normal_texture has a file and pixels"), std::string::npos);
+  EXPECT_NE(error_of_material(wrong).find("normal_texture has a file and pixels"), std::string::npos);
   wrong.normal_texture.file.clear();
-  EXPECT_NE(error_of(wrong).find("normal_texture has 2 pixels for 0 x 0"), std::string::npos);
+  EXPECT_NE(error_of_material(wrong).find("normal_texture has 2 pixels for 0 x 0"), std::string::npos);
   wrong.normal_texture.width = 1;
   wrong.normal_texture.height = 2;
-  EXPECT_NE(error_of(wrong).find("normal_texture: pixel (0, 1) is not in [0, 1]"), std::string::npos);
+  EXPECT_NE(error_of_material(wrong).find("normal_texture: pixel (0, 1) is not in [0, 1]"), std::string::npos);
 }
 
 TEST(GatherMaterials, HeightsArePixelsOfAnySizeOrAFileAsStored) {
@@ -163,15 +163,15 @@ TEST(GatherMaterials, HeightsThatAreWrongAreNamed) {
   wrong.height_texture.pixels = pixels;
   wrong.height_texture.width = 2;
   wrong.height_texture.height = 1;
-  EXPECT_EQ(error_of(wrong), "material 0 (bark): height_texture: pixel (1, 0) is not finite");
+  EXPECT_EQ(error_of_material(wrong), "material 0 (bark): height_texture: pixel (1, 0) is not finite");
   wrong.height_texture.width = 0;
-  EXPECT_NE(error_of(wrong).find("height_texture has 2 pixels for 0 x 1"), std::string::npos);
+  EXPECT_NE(error_of_material(wrong).find("height_texture has 2 pixels for 0 x 1"), std::string::npos);
   wrong.height_texture = {};
   wrong.height_texture.file = "/gone.exr";
-  EXPECT_NE(error_of(wrong, ErrorCode::NotFound).find("height_texture: /gone.exr"), std::string::npos);
+  EXPECT_NE(error_of_material(wrong, ErrorCode::NotFound).find("height_texture: /gone.exr"), std::string::npos);
   wrong = {};
   wrong.height_gain = INFINITY;
-  EXPECT_EQ(error_of(wrong), "material 0: height_gain is inf");
+  EXPECT_EQ(error_of_material(wrong), "material 0: height_gain is inf");
 }
 
 }  // namespace

@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <limits>
 
 #include "base/hash.h"
+#include "base/nonfinite.h"
 #include "tests/support/level_builder.h"
 #include "tests/support/optical_depth.h"
 #include "tests/support/random_unit.h"
@@ -18,9 +18,6 @@ using test::empty_level;
 using test::optical_depth;
 using test::random_unit;
 using test::set_volume;
-
-constexpr float kInf = std::numeric_limits<float>::infinity();
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 struct Cloud {
   bool anisotropic, octants;
@@ -198,12 +195,12 @@ TEST(BrickVolume, AxisParallelRaysAndRaysInVoxelPlanesSeeTheirLength) {
         direction[axis] = sign;
         vec3 origin(across);
         origin[axis] = sign > 0 ? -1.0f : 5.0f;
-        EXPECT_LT(std::abs(transmittance_z(volume, {origin, direction, 0.0f, kInf}, 2.8, 20000, 3)), kSigma);
+        EXPECT_LT(std::abs(transmittance_z(volume, {origin, direction, 0.0f, kInfinity}, 2.8, 20000, 3)), kSigma);
         // Negative zeros are zeros.
         for (int other = 0; other < 3; ++other) {
           if (other != axis) direction[other] = -0.0f;
         }
-        EXPECT_LT(std::abs(transmittance_z(volume, {origin, direction, 0.0f, kInf}, 2.8, 20000, 4)), kSigma);
+        EXPECT_LT(std::abs(transmittance_z(volume, {origin, direction, 0.0f, kInfinity}, 2.8, 20000, 4)), kSigma);
       }
     }
   }
@@ -212,23 +209,23 @@ TEST(BrickVolume, AxisParallelRaysAndRaysInVoxelPlanesSeeTheirLength) {
 TEST(BrickVolume, RaysThatStartInsideOrOnTheBorderSeeWhatIsAhead) {
   const LevelData level = block(0.7f);
   const BrickVolume volume(view_of(level));
-  EXPECT_LT(std::abs(transmittance_z(volume, {{1.0f, 1.3f, 2.2f}, {1, 0, 0}, 0.0f, kInf}, 2.1, 40000, 1)), kSigma);
-  EXPECT_LT(std::abs(transmittance_z(volume, {{0.0f, 1.3f, 2.2f}, {1, 0, 0}, 0.0f, kInf}, 2.8, 40000, 2)), kSigma);
+  EXPECT_LT(std::abs(transmittance_z(volume, {{1.0f, 1.3f, 2.2f}, {1, 0, 0}, 0.0f, kInfinity}, 2.1, 40000, 1)), kSigma);
+  EXPECT_LT(std::abs(transmittance_z(volume, {{0.0f, 1.3f, 2.2f}, {1, 0, 0}, 0.0f, kInfinity}, 2.8, 40000, 2)), kSigma);
   EXPECT_LT(std::abs(transmittance_z(volume, {{-1.0f, 1.3f, 2.2f}, {1, 0, 0}, 3.0f, 4.0f}, 0.7, 40000, 3)), kSigma);
-  EXPECT_FALSE(volume.first_collision({{4.0f, 1.3f, 2.2f}, {1, 0, 0}, 0.0f, kInf}, 1));
-  EXPECT_FALSE(volume.first_collision({{5.0f, 1.3f, 2.2f}, {1, 0, 0}, 0.0f, kInf}, 1));
-  EXPECT_FALSE(volume.first_collision({{1.0f, 5.0f, 2.2f}, {1, 0, 0}, 0.0f, kInf}, 1));
+  EXPECT_FALSE(volume.first_collision({{4.0f, 1.3f, 2.2f}, {1, 0, 0}, 0.0f, kInfinity}, 1));
+  EXPECT_FALSE(volume.first_collision({{5.0f, 1.3f, 2.2f}, {1, 0, 0}, 0.0f, kInfinity}, 1));
+  EXPECT_FALSE(volume.first_collision({{1.0f, 5.0f, 2.2f}, {1, 0, 0}, 0.0f, kInfinity}, 1));
 }
 
 TEST(BrickVolume, DiagonalsThroughVoxelCornersSeeTheirLength) {
   const LevelData level = block(0.4f);
   const BrickVolume volume(view_of(level));
-  EXPECT_LT(
-      std::abs(transmittance_z(volume, {vec3(-1.0f), vec3(1.0f), 0.0f, kInf}, 0.4 * 4.0 * std::sqrt(3.0), 40000, 7)),
-      kSigma);
-  EXPECT_LT(
-      std::abs(transmittance_z(volume, {{-1, -1, 2}, {1, 1, 0}, 0.0f, kInf}, 0.4 * 4.0 * std::sqrt(2.0), 40000, 8)),
-      kSigma);
+  EXPECT_LT(std::abs(transmittance_z(volume, {vec3(-1.0f), vec3(1.0f), 0.0f, kInfinity}, 0.4 * 4.0 * std::sqrt(3.0),
+                                     40000, 7)),
+            kSigma);
+  EXPECT_LT(std::abs(transmittance_z(volume, {{-1, -1, 2}, {1, 1, 0}, 0.0f, kInfinity}, 0.4 * 4.0 * std::sqrt(2.0),
+                                     40000, 8)),
+            kSigma);
 }
 
 TEST(BrickVolume, TheLengthOfTheDirectionOnlyScalesT) {
@@ -258,7 +255,7 @@ TEST(BrickVolume, ShorteningTheRayBehindTheCollisionChangesNothing) {
   Rng rng(10);
   for (uint64_t i = 0; i < 5000; ++i) {
     const vec3 direction = random_unit(rng);
-    LocalRay ray{level.header.bounds.center() - 3.0f * direction, direction, 0.0f, kInf};
+    LocalRay ray{level.header.bounds.center() - 3.0f * direction, direction, 0.0f, kInfinity};
     const auto free = volume.first_collision(ray, i);
     if (!free) continue;
     ray.t_far = free->t + 0.01f;
@@ -278,7 +275,7 @@ TEST(BrickVolume, HugeDensityCollidesAtTheEntryAndNeverLoops) {
     for (uint64_t i = 0; i < 2000; ++i) {
       const vec3 target = vec3(0.5f) + 3.0f * vec3(rng.next(), rng.next(), rng.next());
       const vec3 direction = 10.0f * random_unit(rng);
-      const LocalRay ray{target - direction, direction, 0.0f, kInf};
+      const LocalRay ray{target - direction, direction, 0.0f, kInfinity};
       const auto hit = volume.first_collision(ray, i);
       ASSERT_TRUE(hit);
       ASSERT_TRUE(std::isfinite(hit->t));
@@ -296,8 +293,8 @@ TEST(BrickVolume, HugeFlatFlakesSeenEdgeOnAreCrossed) {
       });
   std::fill(level.voxel_sggx.begin(), level.voxel_sggx.end(), PackedFlakeSggx{{0, 0, 255}, {0, 0, 0}});  // exactly flat
   const BrickVolume volume(view_of(level));
-  EXPECT_FALSE(volume.first_collision({{-1, 1, 1}, {1, 0, 0}, 0.0f, kInf}, 1));
-  EXPECT_TRUE(volume.first_collision({{1, 1, -1}, {0, 0, 1}, 0.0f, kInf}, 1));
+  EXPECT_FALSE(volume.first_collision({{-1, 1, 1}, {1, 0, 0}, 0.0f, kInfinity}, 1));
+  EXPECT_TRUE(volume.first_collision({{1, 1, -1}, {0, 0, 1}, 0.0f, kInfinity}, 1));
 }
 
 TEST(BrickVolume, GrazingAndFarAwayRaysStayInTheBoxAndFinite) {
@@ -308,7 +305,7 @@ TEST(BrickVolume, GrazingAndFarAwayRaysStayInTheBoxAndFinite) {
     const float distance = std::pow(10.0f, 8.0f * rng.next());
     const vec3 direction = random_unit(rng) * std::pow(10.0f, 10.0f * rng.next() - 5.0f);
     const vec3 target(4.0f * rng.next(), i % 2 ? 0.0f : 4.0f, 4.0f * rng.next());
-    const LocalRay ray{target - distance / glm::length(direction) * direction, direction, 0.0f, kInf};
+    const LocalRay ray{target - distance / glm::length(direction) * direction, direction, 0.0f, kInfinity};
     const auto hit = volume.first_collision(ray, i);
     if (!hit) continue;
     ASSERT_TRUE(std::isfinite(hit->t));
@@ -325,29 +322,29 @@ TEST(BrickVolume, RaysWithoutADirectionOrWithNansMeetNothing) {
   const LevelData level = block(100.0f);
   const BrickVolume volume(view_of(level));
   EXPECT_FALSE(volume.first_collision({vec3(1.0f), vec3(0.0f), 0.0f, 100.0f}, 1));
-  EXPECT_FALSE(volume.first_collision({vec3(1.0f), vec3(0.0f), 0.0f, kInf}, 1));
-  EXPECT_EQ(volume.optical_depth({vec3(1.0f), vec3(0.0f), 0.0f, kInf}), 0.0f);
-  EXPECT_EQ(volume.optical_depth({vec3(kNan), vec3(1.0f), 0.0f, kInf}), 0.0f);
-  for (const float bad : {kNan, kInf, -kInf}) {
+  EXPECT_FALSE(volume.first_collision({vec3(1.0f), vec3(0.0f), 0.0f, kInfinity}, 1));
+  EXPECT_EQ(volume.optical_depth({vec3(1.0f), vec3(0.0f), 0.0f, kInfinity}), 0.0f);
+  EXPECT_EQ(volume.optical_depth({vec3(kNan), vec3(1.0f), 0.0f, kInfinity}), 0.0f);
+  for (const float bad : {kNan, kInfinity, -kInfinity}) {
     for (int axis = 0; axis < 3; ++axis) {
-      LocalRay ray{vec3(1.0f), vec3(1, 1, 1), 0.0f, kInf};
+      LocalRay ray{vec3(1.0f), vec3(1, 1, 1), 0.0f, kInfinity};
       ray.origin[axis] = bad;
       const auto a = volume.first_collision(ray, 1);
       EXPECT_TRUE(!a || std::isfinite(a->t));
-      ray = {vec3(1.0f), vec3(1, 1, 1), 0.0f, kInf};
+      ray = {vec3(1.0f), vec3(1, 1, 1), 0.0f, kInfinity};
       ray.direction[axis] = bad;
       const auto b = volume.first_collision(ray, 1);
       EXPECT_TRUE(!b || std::isfinite(b->t));
     }
   }
-  EXPECT_FALSE(volume.first_collision({vec3(1.0f), vec3(1.0f), kNan, kInf}, 1));
+  EXPECT_FALSE(volume.first_collision({vec3(1.0f), vec3(1.0f), kNan, kInfinity}, 1));
   EXPECT_FALSE(volume.first_collision({vec3(1.0f), vec3(1.0f), 0.0f, kNan}, 1));
   EXPECT_FALSE(volume.first_collision({vec3(1.0f), vec3(1.0f), 2.0f, 1.0f}, 1));
-  EXPECT_TRUE(volume.first_collision({vec3(1.0f), vec3(1e-39f, 1.0f, -1e-42f), 0.0f, kInf}, 1));  // denormals
+  EXPECT_TRUE(volume.first_collision({vec3(1.0f), vec3(1e-39f, 1.0f, -1e-42f), 0.0f, kInfinity}, 1));  // denormals
 }
 
 TEST(BrickVolume, AnEmptyVolumeHasNoCollisions) {
-  EXPECT_FALSE(BrickVolume().first_collision({vec3(0.0f), vec3(1.0f), 0.0f, kInf}, 1));
+  EXPECT_FALSE(BrickVolume().first_collision({vec3(0.0f), vec3(1.0f), 0.0f, kInfinity}, 1));
   const LevelData surface_only = test::triangle_soup(3, 0.1f, 1);
   EXPECT_TRUE(BrickVolume(view_of(surface_only)).is_empty());
 }

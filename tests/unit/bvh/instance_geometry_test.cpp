@@ -11,6 +11,7 @@
 #include <set>
 
 #include "base/hash.h"
+#include "base/nonfinite.h"
 #include "base/parallel.h"
 #include "tests/support/level_builder.h"
 #include "tests/support/optical_depth.h"
@@ -23,8 +24,6 @@ using test::random_unit;
 using test::set_volume;
 using test::sphere_level;
 using test::triangle_soup;
-
-constexpr float kInf = std::numeric_limits<float>::infinity();
 
 /// Any affine transform: rotation, shear, non-uniform scale, mirrored every other time.
 mat4x3 random_transform(Rng& rng, float far = 3.0f) {
@@ -290,7 +289,7 @@ TEST(InstanceGeometry, PacketsAndStreamsSeeTheSameDistancesAsSingleRays) {
           got.hit = rtcGetHitFromHitN(reinterpret_cast<RTCHitN*>(&packet.hit), n, lane);
           expect_same(got, base + lane, what);
         } else if (is_native) {
-          EXPECT_EQ(RTCRayN_tfar(reinterpret_cast<RTCRayN*>(&packet.ray), n, lane), kInf) << what;
+          EXPECT_EQ(RTCRayN_tfar(reinterpret_cast<RTCRayN*>(&packet.ray), n, lane), kInfinity) << what;
         }
       }
     }
@@ -789,7 +788,7 @@ TEST(InstanceGeometry, RefusesTransformsThatCannotBeInverted) {
   mat4x3 with_nan(1.0f);
   with_nan[3].y = nan;
   mat4x3 with_infinity(1.0f);
-  with_infinity[0].x = kInf;
+  with_infinity[0].x = kInfinity;
   mat4x3 tiny(1.0f);
   for (int column = 0; column < 3; ++column) tiny[column] *= 1e-39f;
   for (const mat4x3& m : {flat, dependent, with_nan, with_infinity, tiny, mat4x3(0.0f)}) {

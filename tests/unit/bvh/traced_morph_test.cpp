@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 
+#include "base/nonfinite.h"
 #include "base/random.h"
 #include "farfield/ray.h"
 #include "tests/support/level_builder.h"
@@ -13,8 +13,6 @@
 
 namespace farfield {
 namespace {
-
-constexpr float kInf = std::numeric_limits<float>::infinity();
 
 /// A morph between two levels in memory.
 class Morph {
@@ -41,7 +39,7 @@ class Morph {
 
     EmbreeRay shadow = make_ray(origin, direction);
     EXPECT_EQ(morph_->occluded(shadow, context.embree, t, flight), answer.hit.has_value());
-    EXPECT_EQ(shadow.tfar, answer.hit ? -kInf : kInf);
+    EXPECT_EQ(shadow.tfar, answer.hit ? -kInfinity : kInfinity);
     return answer;
   }
 

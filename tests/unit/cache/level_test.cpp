@@ -3,18 +3,15 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <set>
 
+#include "base/nonfinite.h"
 #include "base/random.h"
 #include "cache/level_format.h"
 #include "tests/support/level_builder.h"
 
 namespace farfield {
 namespace {
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInf = std::numeric_limits<float>::infinity();
 
 TEST(PackedColor, EveryStoredColorSurvivesUnpackingAndPacking) {
   for (int q = 0; q < 256; ++q) {
@@ -36,7 +33,7 @@ TEST(PackedColor, ErrorIsHalfAStepOfTheSquareRoot) {
 
 TEST(PackedColor, ClampsAndTakesNanForBlack) {
   EXPECT_EQ(pack_color({-1.0f, 2.0f, kNan}), (PackedColor{{0, 255, 0}}));
-  EXPECT_EQ(pack_color({kInf, -kInf, -0.0f}), (PackedColor{{255, 0, 0}}));
+  EXPECT_EQ(pack_color({kInfinity, -kInfinity, -0.0f}), (PackedColor{{255, 0, 0}}));
 }
 
 TEST(PackUnorm8, RoundsClampsAndTakesNanForZero) {
@@ -44,7 +41,7 @@ TEST(PackUnorm8, RoundsClampsAndTakesNanForZero) {
   EXPECT_EQ(pack_unorm8(0.5f / 255.0f), 1);
   EXPECT_EQ(pack_unorm8(-1e30f), 0);
   EXPECT_EQ(pack_unorm8(1.0001f), 255);
-  EXPECT_EQ(pack_unorm8(kInf), 255);
+  EXPECT_EQ(pack_unorm8(kInfinity), 255);
   EXPECT_EQ(pack_unorm8(kNan), 0);
 }
 
@@ -69,7 +66,7 @@ TEST(PackRadiance, KeepsTheLargestChannelToHalfAPercent) {
     const vec3 back = unpack_radiance(pack_radiance(radiance));
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(back[c], radiance[c], 0.004f * scale) << scale;
   }
-  EXPECT_NEAR(unpack_radiance(pack_radiance(vec3(kInf)))[0], 1e30f, 1e28f);
+  EXPECT_NEAR(unpack_radiance(pack_radiance(vec3(kInfinity)))[0], 1e30f, 1e28f);
 }
 
 TEST(PackNormal, KeepsDirectionsAllAround) {

@@ -4,10 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/nonfinite.h"
 #include "base/random.h"
 #include "tests/support/asset_writer.h"
 #include "tests/support/files.h"
@@ -235,7 +235,6 @@ struct ManifestCase {
 };
 
 TEST(HostileManifest, ValuesThatMakeNoSenseAreNeitherReadNorWritten) {
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<ManifestCase> cases = {
       {"there are no levels", [](auto& m) { m.levels.clear(); }},
       {"levels[1]: level 0 follows level 0", [](auto& m) { m.levels[1].level = 0; }},

@@ -5,15 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 
+#include "base/nonfinite.h"
 #include "tests/support/pictures.h"
 
 namespace farfield {
 namespace {
 
 constexpr int kSide = 48;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Image grey(float value) { return test::constant_picture(kSide, kSide, {value, value, value, 1}); }
 

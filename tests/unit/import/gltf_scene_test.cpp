@@ -10,6 +10,7 @@
 #include "import/read_source.h"
 #include "tests/support/files.h"
 #include "tests/support/gltf_files.h"
+#include "tests/support/import_cases.h"
 
 namespace farfield {
 namespace {
@@ -19,7 +20,6 @@ using namespace test;
 namespace fs = std::filesystem;
 
 const fs::path kAssets = FARFIELD_SHARED_ASSETS;
-const fs::path kCases = fs::path(FARFIELD_TEST_DATA) / "import_cases";
 constexpr double kForestYfov = 0.5631968779732008;
 
 float distance(const vec3& a, const vec3& b) { return glm::length(a - b); }

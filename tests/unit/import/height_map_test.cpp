@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "import/height_map.h"
+#include "base/nonfinite.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 
 namespace farfield {
 namespace {
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
 
 float at(const HeightMap& map, float u, float v, float footprint = 1, Wrap wrap = Wrap::Repeat) {
   return map.at({u, v}, footprint, wrap, wrap);
@@ -50,7 +48,7 @@ TEST(HeightMap, WideFootprintsGetMeansAndTheWholeMapItsMean) {
 }
 
 TEST(HeightMap, HolesTakeTheMeanAroundThemAndAreCounted) {
-  const HeightMap map(4, 2, {1, 3, kNan, 7, 1, 3, kInf, -kInf});
+  const HeightMap map(4, 2, {1, 3, kNan, 7, 1, 3, kInfinity, -kInfinity});
   EXPECT_EQ(map.mended_count(), 3u);
   EXPECT_EQ(map.first_mended(), 2u);
   EXPECT_FLOAT_EQ(at(map, 0.125f, 0.25f), 1);
@@ -60,7 +58,7 @@ TEST(HeightMap, HolesTakeTheMeanAroundThemAndAreCounted) {
 }
 
 TEST(HeightMap, WithoutAnyFiniteValueItIsFlat) {
-  const HeightMap map(2, 2, {kNan, kNan, kInf, kNan});
+  const HeightMap map(2, 2, {kNan, kNan, kInfinity, kNan});
   EXPECT_EQ(map.mended_count(), 4u);
   EXPECT_EQ(at(map, 0.3f, 0.3f), 0);
   EXPECT_EQ(map.least(), 0);

@@ -6,15 +6,16 @@
 #include "import/derived_maps.h"
 #include "import/read_source.h"
 #include "tests/support/files.h"
+#include "tests/support/import_cases.h"
 
 namespace farfield {
 namespace {
 
+using test::kCases;
 using test::TemporaryFolder;
 
 namespace fs = std::filesystem;
 
-const fs::path kCases = fs::path(FARFIELD_TEST_DATA) / "import_cases";
 const char* const kQuad =
     "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n";
 

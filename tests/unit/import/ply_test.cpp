@@ -5,15 +5,15 @@
 
 #include "import/read_source.h"
 #include "tests/support/files.h"
+#include "tests/support/import_cases.h"
 
 namespace farfield {
 namespace {
 
+using test::kCases;
 using test::TemporaryFolder;
 
 namespace fs = std::filesystem;
-
-const fs::path kCases = fs::path(FARFIELD_TEST_DATA) / "import_cases";
 
 Result<SourceMesh> read_text(const std::string& text) {
   const TemporaryFolder folder;

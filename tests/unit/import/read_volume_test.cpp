@@ -15,6 +15,7 @@ namespace farfield {
 namespace {
 
 namespace fs = std::filesystem;
+using test::density_at;
 using test::VdbGrid;
 
 /// A folder with files of its own for each test.
@@ -46,11 +47,6 @@ class ReadVolume : public testing::Test {
 
   const test::TemporaryFolder folder_;
 };
-
-float density_at(const SourceVolume& volume, const ivec3& voxel) {
-  const uint32_t brick = volume.brick_at(voxel / 8);
-  return brick == kEmptyBrick ? 0.0f : volume.bricks[brick][index_in_brick(voxel)];
-}
 
 VdbGrid one_voxel(const ivec3& at = {0, 0, 0}, double value = 1) {
   VdbGrid grid;

@@ -12,6 +12,8 @@
 namespace farfield {
 namespace {
 
+using test::density_at;
+
 double cloud(const ivec3& v) {
   const double inside = 1 - glm::length((dvec3(v) - 11.5) / 12.0);
   return std::max(0.0, inside * test::smooth_noise(v));
@@ -24,12 +26,6 @@ SourceVolume resampled(const SourceVolume& volume, const VoxelShape& shape) {
   auto cubes = resample_to_cubes(volume, shape);
   EXPECT_TRUE(cubes) << cubes.error().message;
   return cubes ? std::move(*cubes) : SourceVolume();
-}
-
-float density_at(const SourceVolume& volume, const ivec3& voxel) {
-  if (glm::any(glm::lessThan(voxel, ivec3(0)))) return 0;
-  const uint32_t brick = volume.brick_at(voxel / 8);
-  return brick == kEmptyBrick ? 0.0f : volume.bricks[brick][index_in_brick(voxel)];
 }
 
 double sum_of(const SourceVolume& volume) {

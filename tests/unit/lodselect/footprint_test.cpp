@@ -7,13 +7,11 @@
 #include <cmath>
 #include <limits>
 
+#include "base/nonfinite.h"
 #include "base/random.h"
 
 namespace farfield {
 namespace {
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInf = std::numeric_limits<float>::infinity();
 
 TEST(LambdaOfFootprint, IsExactAtTheResolutionOfEachLevel) {
   for (const float base : {0.37f, 1.0f, 1e-20f, 12345.678f}) {
@@ -34,7 +32,7 @@ TEST(LambdaOfFootprint, NeverDecreasesAlongAllFloatsOfAnOctave) {
 
 TEST(LambdaOfFootprint, NeverDecreasesAcrossAllMagnitudes) {
   float previous = 0;
-  for (uint32_t bits = 0; bits < std::bit_cast<uint32_t>(kInf); bits += 9973) {
+  for (uint32_t bits = 0; bits < std::bit_cast<uint32_t>(kInfinity); bits += 9973) {
     const float lambda = lambda_of_footprint(std::bit_cast<float>(bits), 0.37f, 200);
     ASSERT_GE(lambda, previous) << std::bit_cast<float>(bits);
     previous = lambda;
@@ -56,7 +54,7 @@ TEST(LambdaOfFootprint, SendsOddFootprintsToTheEnds) {
   EXPECT_EQ(lambda_of_footprint(kNan, 1.0f, 5), 0.0f);
   EXPECT_EQ(lambda_of_footprint(1.0f, kNan, 5), 0.0f);
   EXPECT_EQ(lambda_of_footprint(std::numeric_limits<float>::denorm_min(), 1.0f, 5), 0.0f);
-  EXPECT_EQ(lambda_of_footprint(kInf, 1.0f, 5), 5.0f);
+  EXPECT_EQ(lambda_of_footprint(kInfinity, 1.0f, 5), 5.0f);
   EXPECT_EQ(lambda_of_footprint(3e38f, 1e-40f, 5), 5.0f);
   EXPECT_EQ(lambda_of_footprint(1.0f, 0.0f, 5), 5.0f);
   EXPECT_EQ(lambda_of_footprint(100.0f, 1.0f, 0), 0.0f);
@@ -72,7 +70,7 @@ TEST(SplitLambda, GivesIntegersExactly) {
 }
 
 TEST(SplitLambda, PartsAddUpAndTheBlendStaysBelowOne) {
-  for (float lambda = 0.0f; lambda < 70.0f; lambda = std::nextafter(lambda * 1.001f, kInf)) {
+  for (float lambda = 0.0f; lambda < 70.0f; lambda = std::nextafter(lambda * 1.001f, kInfinity)) {
     const LevelBlend split = split_lambda(lambda);
     ASSERT_EQ(static_cast<float>(split.level) + split.blend, lambda);
     ASSERT_GE(split.blend, 0.0f);
@@ -84,12 +82,12 @@ TEST(SplitLambda, PartsAddUpAndTheBlendStaysBelowOne) {
 }
 
 TEST(SplitLambda, SendsNanAndNegativeValuesToTheFinestLevelAndSurvivesInfinity) {
-  for (const float lambda : {kNan, -1.0f, -kInf, -0.0f}) {
+  for (const float lambda : {kNan, -1.0f, -kInfinity, -0.0f}) {
     EXPECT_EQ(split_lambda(lambda).level, 0);
     EXPECT_EQ(split_lambda(lambda).blend, 0.0f);
   }
-  EXPECT_EQ(split_lambda(kInf).level, 1000000);
-  EXPECT_EQ(split_lambda(kInf).blend, 0.0f);
+  EXPECT_EQ(split_lambda(kInfinity).level, 1000000);
+  EXPECT_EQ(split_lambda(kInfinity).blend, 0.0f);
 }
 
 TEST(FinestFootprint, IsThatOfTheNearestPointOfTheBox) {
@@ -128,8 +126,8 @@ TEST(FinestFootprint, TakesTheFinestOfTheCamerasAndInfinityWithoutAny) {
   const std::array cameras = {TessellationCamera{{101.0f, 0.0f, 0.0f}, 0.0f, 0.01f},
                               TessellationCamera{{}, 0.5f, 0.0f}};
   EXPECT_FLOAT_EQ(finest_footprint(cameras, box), 0.5f);
-  EXPECT_EQ(finest_footprint({}, box), kInf);
-  EXPECT_EQ(finest_footprint(cameras, Box3{}), kInf);
+  EXPECT_EQ(finest_footprint({}, box), kInfinity);
+  EXPECT_EQ(finest_footprint(cameras, Box3{}), kInfinity);
 }
 
 TEST(FinestFootprint, AsksForTheFinestLevelWhenSomethingIsNan) {
@@ -144,7 +142,7 @@ TEST(FinestFootprint, SurvivesHugeDistances) {
   const TessellationCamera camera{{1e30f, 0.0f, 0.0f}, 0.0f, 0.01f};
   EXPECT_FLOAT_EQ(finest_footprint(std::span(&camera, 1), Box3{vec3(-1.0f), vec3(1.0f)}), 1e28f);
   const TessellationCamera far{{3e38f, 0.0f, 0.0f}, 0.0f, 1000.0f};
-  EXPECT_EQ(finest_footprint(std::span(&far, 1), Box3{vec3(-1.0f), vec3(1.0f)}), kInf);
+  EXPECT_EQ(finest_footprint(std::span(&far, 1), Box3{vec3(-1.0f), vec3(1.0f)}), kInfinity);
 }
 
 TEST(CoveredPixels, AreThoseOfTheMiddleAndOfTheSlant) {

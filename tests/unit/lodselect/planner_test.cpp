@@ -11,14 +11,13 @@
 #include <string>
 #include <utility>
 
+#include "base/nonfinite.h"
 #include "base/random.h"
 
 namespace farfield {
 namespace {
 
 constexpr uint64_t kUnlimited = std::numeric_limits<uint64_t>::max();
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInf = std::numeric_limits<float>::infinity();
 
 /// Levels 0, 1, 2, ... of the given sizes, of which one instance asks.
 PlanAsset asset_of(std::vector<uint64_t> sizes, float wanted = 0, double pixels = 1) {
@@ -180,7 +179,7 @@ TEST(PlanLevels, NumberInTheErrorIsTheSmallestBudgetThatWorks) {
 }
 
 TEST(PlanLevels, GivesWhatTheCamerasAskWhenThereIsRoom) {
-  const std::vector<float> wanted = {-3.0f, 0.0f, 0.99f, 1.0f, 2.5f, 4.0f, 100.0f, kInf, -kInf, kNan};
+  const std::vector<float> wanted = {-3.0f, 0.0f, 0.99f, 1.0f, 2.5f, 4.0f, 100.0f, kInfinity, -kInfinity, kNan};
   const std::vector<uint32_t> expected = {0, 0, 0, 1, 2, 4, 4, 4, 0, 0};
   std::vector<PlanAsset> assets;
   for (const float lambda : wanted) assets.push_back(asset_of({50, 40, 30, 20, 10}, lambda));
@@ -375,7 +374,7 @@ TEST(PlanLevels, RefusesAssetsThatMakeNoSense) {
   refuse(asset);
   refuse(asset_of(std::vector<uint64_t>(257, 1)));
   refuse(asset_of({2, 1}, 0, kNan));
-  refuse(asset_of({2, 1}, 0, kInf));
+  refuse(asset_of({2, 1}, 0, kInfinity));
 }
 
 TEST(PlanLevels, SurvivesErrorsTooLargeForADouble) {

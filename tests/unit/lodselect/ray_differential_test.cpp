@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <limits>
 
+#include "base/nonfinite.h"
 #include "base/random.h"
 #include "base/vec.h"
 
@@ -14,7 +14,6 @@ namespace farfield {
 namespace {
 
 constexpr float kStep = 1e-3f;  // of a pixel
-constexpr float kInf = std::numeric_limits<float>::infinity();
 
 vec3 random_unit(Rng& rng) {
   vec3 v;
@@ -164,7 +163,7 @@ TEST(RayDifferential, AtExtremesIsFiniteOrSaysSo) {
   EXPECT_TRUE(is_finite(grazing.origin_dx) && is_finite(grazing.origin_dy));
   EXPECT_TRUE(is_finite(transferred(ray, direction, 1.0f, glm::normalize(vec3(1, 0, 1e-6f))).origin_dx));
   EXPECT_EQ(footprint_axes({}, direction, 1e30f).longer, 0.0f);
-  EXPECT_FALSE(std::isfinite(footprint_axes(ray, direction, kInf).longer));
+  EXPECT_FALSE(std::isfinite(footprint_axes(ray, direction, kInfinity).longer));
   RayDifferential needle = ray;
   needle.direction_dy = vec3(0.0f);
   EXPECT_EQ(footprint_axes(needle, direction, 5.0f).shorter, 0.0f);

@@ -10,7 +10,7 @@ namespace farfield {
 namespace {
 
 /// nu x nv quads; optionally closed in u, in v.
-QuadMesh make_grid(uint32_t nu, uint32_t nv, bool closed_u, bool closed_v) {
+QuadMesh make_quad_grid(uint32_t nu, uint32_t nv, bool closed_u, bool closed_v) {
   const uint32_t columns = closed_u ? nu : nu + 1, rows = closed_v ? nv : nv + 1;
   const auto vertex = [&](uint32_t i, uint32_t j) { return j % rows * columns + i % columns; };
   std::vector<PolygonCorners> faces;
@@ -52,7 +52,7 @@ std::map<int, int> lengths(const QuadMesh& mesh) {
 }
 
 TEST(FaceLoops, OfAGridEndAtItsBorders) {
-  const QuadMesh grid = make_grid(5, 3, false, false);
+  const QuadMesh grid = make_quad_grid(5, 3, false, false);
   EXPECT_EQ(lengths(grid), (std::map<int, int>{{5, 3}, {3, 5}}));
   for (const FaceLoop& loop : find_face_loops(grid)) {
     EXPECT_EQ(loop.before, kNoIndex);
@@ -61,11 +61,11 @@ TEST(FaceLoops, OfAGridEndAtItsBorders) {
 }
 
 TEST(FaceLoops, OfATubeAreClosedAroundIt) {
-  EXPECT_EQ(lengths(make_grid(6, 4, true, false)), (std::map<int, int>{{-6, 4}, {4, 6}}));
+  EXPECT_EQ(lengths(make_quad_grid(6, 4, true, false)), (std::map<int, int>{{-6, 4}, {4, 6}}));
 }
 
 TEST(FaceLoops, OfATorusAreAllClosed) {
-  EXPECT_EQ(lengths(make_grid(6, 4, true, true)), (std::map<int, int>{{-6, 4}, {-4, 6}}));
+  EXPECT_EQ(lengths(make_quad_grid(6, 4, true, true)), (std::map<int, int>{{-6, 4}, {-4, 6}}));
 }
 
 TEST(FaceLoops, OfACubeGoAroundItInThreeDirections) {
@@ -74,7 +74,7 @@ TEST(FaceLoops, OfACubeGoAroundItInThreeDirections) {
 }
 
 TEST(FaceLoops, TheSameWhicheverQuadTheyAreFoundFrom) {
-  const QuadMesh grid = make_grid(5, 3, false, false);
+  const QuadMesh grid = make_quad_grid(5, 3, false, false);
   for (uint32_t quad = 5; quad < 10; ++quad) {
     for (const int corner : {1, 3}) {
       const FaceLoop loop = trace_loop(grid, quad, corner);

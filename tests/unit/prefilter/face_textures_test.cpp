@@ -33,7 +33,7 @@ double uv_area(const UvTriangle& t) {
   return 0.5 * std::abs(u.x * v.y - u.y * v.x);
 }
 
-void expect_near(const vec3& a, const vec3& b, float tolerance) {
+void expect_close(const vec3& a, const vec3& b, float tolerance) {
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(a[c], b[c], tolerance);
 }
 
@@ -57,7 +57,7 @@ TEST(FaceTextures, AverageIsTheIntegralOverTheTexels) {
         ++count;
       }
     }
-    expect_near(average_textures(m, t).dielectric, vec3(sum / count), 3e-3f);
+    expect_close(average_textures(m, t).dielectric, vec3(sum / count), 3e-3f);
   }
 }
 
@@ -84,7 +84,7 @@ TEST(FaceTextures, PartsAverageToTheWhole) {
       sum += weight * average_textures(m, part).dielectric;
       weights += weight;
     }
-    expect_near(sum / weights, average_textures(m, whole).dielectric, 2e-4f);
+    expect_close(sum / weights, average_textures(m, whole).dielectric, 2e-4f);
   }
 }
 
@@ -95,7 +95,7 @@ TEST(FaceTextures, WholeImageAveragesToItsMeanHoweverOftenItRepeats) {
     const UvTriangle a = {vec2(0, 0), vec2(repeat, 0), vec2(repeat, repeat)};
     const UvTriangle b = {vec2(0, 0), vec2(repeat, repeat), vec2(0, repeat)};
     const vec3 both = 0.5f * (average_textures(m, a).dielectric + average_textures(m, b).dielectric);
-    expect_near(both, mean, 1e-3f);
+    expect_close(both, mean, 1e-3f);
   }
 }
 
@@ -109,28 +109,28 @@ TEST(FaceTextures, CoarserLevelsAgreeWithTheFullImage) {
   const SourceMaterial m = textured(image(n, n, texels));
   const UvTriangle t = {vec2(0.05f, 0.1f), vec2(0.9f, 0.2f), vec2(0.3f, 0.95f)};
   const vec2 centre = (t[0] + t[1] + t[2]) / 3.0f;  // the mean of a linear function
-  expect_near(average_textures(m, t).dielectric, vec3(centre, 0.5f), 2e-3f);
+  expect_close(average_textures(m, t).dielectric, vec3(centre, 0.5f), 2e-3f);
 }
 
 TEST(FaceTextures, ColourUnderTransparentTexelsDoesNotBleedIn) {
   SourceMaterial m = textured(image(2, 1, {vec4(1, 0, 0, 1), vec4(0, 1, 0, 0)}));
   m.alpha_mode = AlphaMode::Mask;
   const UvTriangle t = {vec2(0, 0), vec2(1, 0), vec2(1, 1)};
-  expect_near(average_textures(m, t).dielectric, vec3(1, 0, 0), 1e-4f);
+  expect_close(average_textures(m, t).dielectric, vec3(1, 0, 0), 1e-4f);
 }
 
 TEST(FaceTextures, UnusableAndFlatCoordinatesGiveSomethingSensible) {
   const SourceMaterial m = textured(image(2, 1, {vec4(1, 0, 0, 1), vec4(0, 0, 1, 1)}));
   const float nan = std::nanf("");
   for (const vec2 bad : {vec2(nan, 0), vec2(1e9f, 0), vec2(0, -INFINITY)}) {
-    expect_near(average_textures(m, {vec2(0, 0), bad, vec2(1, 1)}).dielectric, vec3(0.5f, 0, 0.5f), 1e-3f);
+    expect_close(average_textures(m, {vec2(0, 0), bad, vec2(1, 1)}).dielectric, vec3(0.5f, 0, 0.5f), 1e-3f);
   }
   // All corners in one texel, as palette textures are used
-  expect_near(average_textures(m, {vec2(0.25f, 0.5f), vec2(0.25f, 0.5f), vec2(0.25f, 0.5f)}).dielectric, vec3(1, 0, 0),
-              1e-4f);
+  expect_close(average_textures(m, {vec2(0.25f, 0.5f), vec2(0.25f, 0.5f), vec2(0.25f, 0.5f)}).dielectric, vec3(1, 0, 0),
+               1e-4f);
   // A line across both texels
-  expect_near(average_textures(m, {vec2(0, 0.5f), vec2(1, 0.5f), vec2(0.5f, 0.5f)}).dielectric, vec3(0.5f, 0, 0.5f),
-              0.02f);
+  expect_close(average_textures(m, {vec2(0, 0.5f), vec2(1, 0.5f), vec2(0.5f, 0.5f)}).dielectric, vec3(0.5f, 0, 0.5f),
+               0.02f);
 }
 
 TEST(FaceTextures, MetalTexelsTakeTheirColourIntoTheHighlight) {
@@ -142,11 +142,11 @@ TEST(FaceTextures, MetalTexelsTakeTheirColourIntoTheHighlight) {
   const UvTriangle halves[2] = {{vec2(0, 0), vec2(0.25f, 0), vec2(0.25f, 1)}, {vec2(0.75f, 0), vec2(1, 0), vec2(1, 1)}};
   const MaterialSample left = material_sample(m, average_textures(m, halves[0]), vec3(1.0f));
   const MaterialSample right = material_sample(m, average_textures(m, halves[1]), vec3(1.0f));
-  expect_near(left.diffuse, vec3(1, 0, 0), 1e-3f);
-  expect_near(left.specular, vec3(0.04f), 1e-3f);
+  expect_close(left.diffuse, vec3(1, 0, 0), 1e-3f);
+  expect_close(left.specular, vec3(0.04f), 1e-3f);
   EXPECT_NEAR(left.roughness, 0.5, 1e-3);
-  expect_near(right.diffuse, vec3(0.0f), 1e-3f);
-  expect_near(right.specular, vec3(0, 1, 0), 1e-3f);
+  expect_close(right.diffuse, vec3(0.0f), 1e-3f);
+  expect_close(right.specular, vec3(0, 1, 0), 1e-3f);
   EXPECT_NEAR(right.roughness, 1, 1e-3);
 }
 

@@ -46,14 +46,14 @@ TEST(GentleSlopes, SlopesNearOneAreNot) {
 
 TEST(GentleSlopes, BordersAreFartherThanTheResolution) {
   const Surface plane = make_plane(40, 40, 1.0f, 1.0f);
-  constexpr float kResolution = 0.1f, kPatchAndFace = 0.12f;
-  const std::vector<uint8_t> gentle = gentle_faces(plane, kResolution);
+  constexpr float kSlopeResolution = 0.1f, kPatchAndFace = 0.12f;
+  const std::vector<uint8_t> gentle = gentle_faces(plane, kSlopeResolution);
   for (size_t face = 0; face < gentle.size(); ++face) {
     const uvec3& t = plane.triangles[face];
     const vec3 middle = (plane.positions[t.x] + plane.positions[t.y] + plane.positions[t.z]) / 3.0f;
     const float to_border = std::min(std::min(middle.x, 1 - middle.x), std::min(middle.y, 1 - middle.y));
-    EXPECT_TRUE(to_border >= kResolution || !gentle[face]) << face;
-    EXPECT_TRUE(to_border <= kResolution + kPatchAndFace || gentle[face]) << face;
+    EXPECT_TRUE(to_border >= kSlopeResolution || !gentle[face]) << face;
+    EXPECT_TRUE(to_border <= kSlopeResolution + kPatchAndFace || gentle[face]) << face;
   }
 }
 

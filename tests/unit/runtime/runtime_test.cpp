@@ -613,8 +613,8 @@ TEST_F(RuntimeTest, ALevelThatDidNotFitIsLoadedOnceAPlanHasRoom) {
 }
 
 TEST_F(RuntimeTest, AnInstanceThatDoesNotFitIsRefusedAtOnceWithTheNumberThatWouldDo) {
-  constexpr uint64_t kBudget = 4 << 20;
-  Host host(with_budget(kBudget));
+  constexpr uint64_t kSmall = 4 << 20;
+  Host host(with_budget(kSmall));
   const AssetId asset = host.add(sphere());
   host.plan(vec3(0, 0, 3));
   hash_of_hits(host);  // levels are loaded, and have to go
@@ -630,8 +630,8 @@ TEST_F(RuntimeTest, AnInstanceThatDoesNotFitIsRefusedAtOnceWithTheNumberThatWoul
   }
   EXPECT_EQ(error.code, ErrorCode::OutOfBudget);
   EXPECT_GT(count, 10000u);
-  EXPECT_LE(host.runtime().stats().peak_accounted_bytes, kBudget);
-  EXPECT_LE(host.plan(vec3(0, 0, 3)).planned_bytes, kBudget);  // what there is works on
+  EXPECT_LE(host.runtime().stats().peak_accounted_bytes, kSmall);
+  EXPECT_LE(host.plan(vec3(0, 0, 3)).planned_bytes, kSmall);  // what there is works on
 
   const uint64_t enough = number_in(error.message);
   EXPECT_EQ(*Runtime::least_budget({sphere().string(), (sphere() / ".").string()}, count + 1), enough);

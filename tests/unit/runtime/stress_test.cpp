@@ -27,7 +27,7 @@ constexpr int kFrames = 12, kRays = 600;
 constexpr int kFrames = 60, kRays = 2000;
 #endif
 constexpr int kThreads = 4, kAssets = 3;
-constexpr uint64_t kBudget = 1200 << 10;  // less than frames ask for
+constexpr uint64_t kTightBudget = 1200 << 10;  // less than frames ask for
 
 std::string name_of(int asset) { return "ball_" + std::to_string(asset) + ".farfield"; }
 
@@ -101,7 +101,7 @@ std::vector<Seen> look(const Host& host, int frame, const vec3& eye) {
 
 std::unique_ptr<Host> open(const fs::path& folder, Residency residency, Blend blend) {
   RuntimeOptions options;
-  options.budget_bytes = kBudget;
+  options.budget_bytes = kTightBudget;
   options.residency = residency;
   options.blend = blend;
   auto host = std::make_unique<Host>(options);
@@ -151,12 +151,13 @@ void fly(Residency residency, Blend blend, bool looks_ahead = false) {
     const bool is_said = host->message_count() > 0 || host->runtime().stats().fallbacks > 0;
     EXPECT_TRUE(is_said || seen == right) << frame;
   }
-  EXPECT_GT(most_asked, kBudget);
+  EXPECT_GT(most_asked, kTightBudget);
   EXPECT_TRUE(reference->messages.empty()) << reference->messages.front();
   EXPECT_GT(host->message_count(), 0u);  // some of the harm was met
   EXPECT_GT(hits, size_t{kFrames} * kRays / 20);
   EXPECT_GT(reference->runtime().stats().levels_released, uint64_t{kFrames} / 4);
-  for (Host* each : {reference.get(), host.get()}) EXPECT_LE(each->runtime().stats().peak_accounted_bytes, kBudget);
+  for (Host* each : {reference.get(), host.get()})
+    EXPECT_LE(each->runtime().stats().peak_accounted_bytes, kTightBudget);
 }
 
 TEST(Stress, FilesAreDamagedWhileRaysWaitForThem) { fly(Residency::Wait, Blend::Dissolve); }

@@ -7,7 +7,7 @@ namespace farfield {
 namespace {
 
 TEST(TextureCache, CountsFilesOfTheSameContentOnce) {
-  constexpr uint64_t kBytes = uint64_t{100} << 20, kBudget = uint64_t{8} << 30;
+  constexpr uint64_t kBytes = uint64_t{100} << 20, kPlenty = uint64_t{8} << 30;
   Messages silent({});
   TextureCache cache(silent);
   AssetTexture texture;
@@ -16,13 +16,13 @@ TEST(TextureCache, CountsFilesOfTheSameContentOnce) {
   texture.file_bytes = 1000;
   texture.cache_bytes = kBytes;
   EXPECT_EQ(cache.add("tile_0", texture, Wrap::Repeat, Wrap::Repeat), 0u);
-  const uint64_t of_one = cache.wanted_bytes(kBudget);
+  const uint64_t of_one = cache.wanted_bytes(kPlenty);
   EXPECT_GE(of_one, kBytes);
   EXPECT_EQ(cache.add("tile_1", texture, Wrap::Clamp, Wrap::Repeat), 1u) << "it may continue otherwise";
-  EXPECT_EQ(cache.wanted_bytes(kBudget), of_one);
+  EXPECT_EQ(cache.wanted_bytes(kPlenty), of_one);
   texture.file_hash = 8;
   cache.add("tile_2", texture, Wrap::Repeat, Wrap::Repeat);
-  EXPECT_EQ(cache.wanted_bytes(kBudget), of_one + kBytes);
+  EXPECT_EQ(cache.wanted_bytes(kPlenty), of_one + kBytes);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace farfield {
 namespace {
 
 constexpr float kAngles[] = {0.0f, 0.05f, 0.4f, 1.0f, 1.5f, 0.5f * kPi};
-const vec3 kNormal(0, 0, 1);
+const vec3 kTopNormal(0, 0, 1);
 
 vec3 shading_normal(float angle) { return {std::sin(angle), 0, std::cos(angle)}; }
 
@@ -38,7 +38,7 @@ TEST(HorizonLobe, GivesBackWhatTheLobeAroundTheShadingNormalLoses) {
   for (const float angle : kAngles) {
     const vec3 m = shading_normal(angle);
     for (const float reflected : {1.0f, 0.7f, 0.0f}) {
-      const HorizonLobe lobe(white(reflected), m, kNormal);
+      const HorizonLobe lobe(white(reflected), m, kTopNormal);
       const double seen = integral([&](const vec3& wi) {
         const float cosine = glm::dot(m, wi);
         if (cosine * wi.z < 0) return lobe.eval(wi).x;  // on different sides of the two normals
@@ -50,7 +50,7 @@ TEST(HorizonLobe, GivesBackWhatTheLobeAroundTheShadingNormalLoses) {
 }
 
 TEST(HorizonLobe, SamplesFollowTheDensity) {
-  const HorizonLobe lobe(white(0.7f), shading_normal(1), kNormal);
+  const HorizonLobe lobe(white(0.7f), shading_normal(1), kTopNormal);
   EXPECT_NEAR(integral([&](const vec3& wi) { return lobe.pdf(wi); }), 1, 2e-3);
   Rng rng(3);
   double up = 0, height = 0;
@@ -67,18 +67,18 @@ TEST(HorizonLobe, SamplesFollowTheDensity) {
 
 TEST(HorizonLobe, IsNotThereWhereNothingIsLost) {
   SurfaceParams params = white(0.5f);
-  EXPECT_EQ(HorizonLobe(params, kNormal, kNormal).chance, 0);
+  EXPECT_EQ(HorizonLobe(params, kTopNormal, kTopNormal).chance, 0);
   params.diffuse = params.transmission = vec3(0.0f);
-  EXPECT_EQ(HorizonLobe(params, shading_normal(1), kNormal).chance, 0);
+  EXPECT_EQ(HorizonLobe(params, shading_normal(1), kTopNormal).chance, 0);
   params.diffuse = params.transmission = vec3(std::numeric_limits<float>::quiet_NaN());
-  EXPECT_EQ(HorizonLobe(params, shading_normal(1), kNormal).chance, 0);
-  EXPECT_EQ(HorizonLobe(white(1), vec3(std::numeric_limits<float>::quiet_NaN()), kNormal).chance, 0);
+  EXPECT_EQ(HorizonLobe(params, shading_normal(1), kTopNormal).chance, 0);
+  EXPECT_EQ(HorizonLobe(white(1), vec3(std::numeric_limits<float>::quiet_NaN()), kTopNormal).chance, 0);
 }
 
 TEST(HorizonLobe, NeverReturnsMoreThanItGets) {
   SurfaceParams params;
   params.diffuse = vec3(5), params.transmission = vec3(5), params.specular = vec3(0.25f);
-  const HorizonLobe lobe(params, shading_normal(0.5f * kPi), kNormal);
+  const HorizonLobe lobe(params, shading_normal(0.5f * kPi), kTopNormal);
   EXPECT_NEAR(lobe.reflected.x + lobe.transmitted.x, 0.5f * 0.75f, 1e-5);
 }
 

@@ -10,7 +10,7 @@ namespace {
 
 using namespace test;
 
-const vec3 kNormal(0, 0, 1);
+const vec3 kSheetNormal(0, 0, 1);
 
 FlakeParams planks(float albedo) {
   FlakeParams p;
@@ -34,7 +34,7 @@ TEST(SheetPhase, WhitePiecesLoseNothing) {
   Rng rng(1);
   for (const SheetShape& shape : shapes()) {
     for (const float gap : {0.0f, 0.3f, 0.9f}) {
-      const SheetPhase phase(planks(1), shape, gap, kNormal, vec3(random_direction(rng)));
+      const SheetPhase phase(planks(1), shape, gap, kSheetNormal, vec3(random_direction(rng)));
       for (int i = 0; i < 50; ++i) EXPECT_NEAR(phase.sample(rng).weight.x, 1, 1e-4);
     }
   }
@@ -45,7 +45,7 @@ TEST(SheetPhase, NeverScattersMoreThanItReceives) {
   for (const SheetShape& shape : shapes()) {
     FlakeParams p = planks(0.6f);
     p.specular = vec3(0.3f), p.roughness2 = 0.1f;
-    const SheetPhase phase(p, shape, 0.5f, kNormal, vec3(random_direction(rng)));
+    const SheetPhase phase(p, shape, 0.5f, kSheetNormal, vec3(random_direction(rng)));
     const Mean albedo = mean_of(4000, 3, [&](Rng& r) { return phase.sample(r).weight; });
     EXPECT_LT(albedo.value.x, 1.004 + 5 * albedo.standard_error.x);
   }
@@ -59,7 +59,7 @@ TEST(SheetPhase, SamplesWhatItEvaluates) {
     return value * (1.0f + glm::dot(wi, towards));  // so that directions matter
   };
   for (const SheetShape& shape : shapes()) {
-    const SheetPhase phase(planks(0.6f), shape, 0.5f, kNormal, vec3(random_direction(rng)));
+    const SheetPhase phase(planks(0.6f), shape, 0.5f, kSheetNormal, vec3(random_direction(rng)));
     const Mean sampled = mean_of(40000, 5, [&](Rng& r) {
       const ScatterSample sample = phase.sample(r);
       return weighed(sample.weight, sample.wi);
@@ -76,7 +76,7 @@ TEST(SheetPhase, SamplesWhatItEvaluates) {
 TEST(SheetPhase, HasADensityOfOne) {
   Rng rng(7);
   for (const SheetShape& shape : shapes()) {
-    const SheetPhase phase(planks(0.6f), shape, 0.5f, kNormal, vec3(random_direction(rng)));
+    const SheetPhase phase(planks(0.6f), shape, 0.5f, kSheetNormal, vec3(random_direction(rng)));
     const Mean sum = mean_of(40000, 8, [&](Rng& r) { return vec3(phase.pdf(vec3(random_direction(r))) * 4 * kPi); });
     EXPECT_NEAR(sum.value.x, 1, 5 * sum.standard_error.x + 0.01);
   }
@@ -84,9 +84,9 @@ TEST(SheetPhase, HasADensityOfOne) {
 
 TEST(SheetPhase, OfASquareWithoutDepthIsLambertsLaw) {
   FlakeParams p = planks(0.5f);
-  p.sggx = SymMat3::outer(kNormal);
+  p.sggx = SymMat3::outer(kSheetNormal);
   Rng rng(9);
-  const SheetPhase phase(p, {1, 1, 0}, 0.5f, kNormal, glm::normalize(vec3(0.3f, 0.1f, 0.8f)));
+  const SheetPhase phase(p, {1, 1, 0}, 0.5f, kSheetNormal, glm::normalize(vec3(0.3f, 0.1f, 0.8f)));
   for (int i = 0; i < 100; ++i) {
     const vec3 wi(random_direction(rng));
     EXPECT_NEAR(phase.eval(wi, rng).x, 0.5f * std::max(wi.z, 0.0f) * kInvPi, 1e-4f);
@@ -98,7 +98,7 @@ TEST(SheetPhase, LightDoesNotReachWhereItsWayIsBlocked) {
   Rng rng(10);
   FlakeParams black_behind = planks(0.01f);  // so that next to nothing comes back from other pieces
   const vec3 flat = glm::normalize(vec3(1, 0, 0.2f));
-  const SheetPhase phase(black_behind, {1, 1, 0.5f}, 0.3f, kNormal, flat);
+  const SheetPhase phase(black_behind, {1, 1, 0.5f}, 0.3f, kSheetNormal, flat);
   const auto light = [&](const vec3& wi) {
     return mean_of(2000, 11, [&](Rng& r) { return phase.eval(wi, r); }).value.x;
   };
