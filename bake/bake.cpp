@@ -390,8 +390,7 @@ class Baker {
     if (options_.job.is_cancelled()) return cancelled();
     unwrap_walls(resolution, is_macrosurface);
     SplitSurface parts = split(surface_, is_macrosurface, sub_resolution_);
-    const size_t first_shell_face = parts.macrosurface.triangles.size();
-    FARFIELD_TRY(wrap_walls(level, resolution, parts.macrosurface, level_report));
+    FARFIELD_TRY_LET(const size_t first_shell_face, wrap_walls(level, resolution, parts, level_report));
     level_report.macrosurface_triangles = parts.macrosurface.triangles.size();
     level_report.voxelized_triangles = sub_resolution_.triangles.size();
     level_report.analysis_seconds = analysis.seconds();
@@ -459,17 +458,30 @@ class Baker {
     is_shell_ = {};
   }
 
-  /// Wraps what looks like a wall at this resolution or did before. Levels are wrapped afresh, as volumes are made
-  /// afresh.
-  Result<void> wrap_walls(uint32_t level, double resolution, Surface& macrosurface, LevelReport& level_report) {
-    FARFIELD_TRY_LET(const auto kinds, find_walls(sub_resolution_, resolution));
-    move_pieces(kinds);
-    if (wall_.triangles.empty() && sheet_.triangles.empty()) return {};
-    level_report.worthless =
-        level != last_level_ && least_shell_bytes(wall_, sheet_, resolution) > most_bytes_worth_writing(level);
-    if (level_report.worthless) return {};
-    FARFIELD_TRY(wrap(wall_, resolution, wrap_wall, macrosurface));
-    return wrap(sheet_, resolution, lay_sheet, macrosurface);
+  /// Wraps what looks like a wall at this resolution or did before, and says the first face of what is around it.
+  /// Levels are wrapped afresh, as volumes are made afresh.
+  Result<size_t> wrap_walls(uint32_t level, double resolution, SplitSurface& parts, LevelReport& level_report) {
+    FARFIELD_TRY_LET(const Walls walls, find_walls(sub_resolution_, parts.macrosurface, resolution));
+    move_pieces(walls.kinds);
+    const bool are_none = wall_.triangles.empty() && sheet_.triangles.empty();
+    level_report.worthless = !are_none && level != last_level_ &&
+                             least_shell_bytes(wall_, sheet_, resolution) > most_bytes_worth_writing(level);
+    if (are_none || level_report.worthless) return parts.macrosurface.triangles.size();
+    move_cores(walls.is_core, parts);
+    const size_t first_shell_face = parts.macrosurface.triangles.size();
+    FARFIELD_TRY(wrap(wall_, resolution, wrap_wall, parts.macrosurface));
+    FARFIELD_TRY(wrap(sheet_, resolution, lay_sheet, parts.macrosurface));
+    return first_shell_face;
+  }
+
+  /// What runs inside of walls leaves the macrosurface and is wrapped with their pieces.
+  void move_cores(const std::vector<uint8_t>& is_core, SplitSurface& parts) {
+    if (std::ranges::count(is_core, 1) == 0) return;
+    std::vector<uint8_t> stays;
+    for (const uint8_t is_one : is_core) stays.push_back(!is_one);
+    SplitSurface rest = split(parts.macrosurface, stays, wall_);
+    parts.macrosurface = std::move(rest.macrosurface);
+    compose(parts.macro_face, rest.macro_face);
   }
 
   /// What is of walls leaves sub_resolution_.

@@ -14,7 +14,7 @@
 namespace farfield {
 
 /// Goes up when simplify() gives other results.
-inline constexpr uint32_t kSimplifyVersion = 1;
+inline constexpr uint32_t kSimplifyVersion = 2;
 
 /// What collapses.
 enum class SimplifyMethod {

@@ -40,28 +40,37 @@ constexpr double kSameNormal = 0.9, kSamePlane = 0.35;  ///< cosine, distance: o
 constexpr double kMostTransmission = 0.02;              ///< mean albedo of what stops them
 constexpr double kNearPlane = 0.75, kNearMiddle = 2.0;  ///< what a layer's middle answers for
 constexpr int kNearCells = 3;                           ///< cells around it that reach so far
+constexpr double kInsideLayer =
+    1.3;                          ///< height over its plane, by the pieces' standard deviation; they reach 1.7 if even
+constexpr double kAtLayer = 0.5;  ///< the same in resolutions, of what goes with such a core
+constexpr double kFlat = 0.02;    ///< beside that, for pieces without thickness
+constexpr double kLeastCore = 0.5;  ///< share of the disc's rays that a core stops
 
-/// Whether this layer's middle answers for a point.
-bool answers_for(const Layer& layer, const dvec3& point) {
+/// Whether a layer's middle answers for a point no higher above its plane than this.
+bool answers_for(const Layer& layer, const dvec3& point, double highest) {
   const dvec3 offset = point - layer.middle;
   const double height = layer.height(point);
-  return std::abs(height) <= kNearPlane && glm::dot(offset, offset) - height * height <= kNearMiddle * kNearMiddle;
+  return std::abs(height) <= highest && glm::dot(offset, offset) - height * height <= kNearMiddle * kNearMiddle;
 }
 
+struct ThinLayer : Layer {
+  double spread;  ///< standard deviation of heights
+};
+
 /// The layer that these moments are of, if they are of a thin one.
-std::optional<Layer> thin_layer(const Moments& moments) {
+std::optional<ThinLayer> thin_layer(const Moments& moments) {
   if (!(moments.area > 0)) return {};
   const glm::dmat3 m = moments.covariance();
   const dvec3 variance = eigenvalues_of(m);
   if (!(variance.y >= kLeastExtent2 && variance.z <= kMostThickness2)) return {};
   const auto normal = eigenvector(m, variance.z);
   if (!normal) return {};
-  return Layer{moments.middle(), *normal};
+  return ThinLayer{{moments.middle(), *normal}, std::sqrt(std::max(variance.z, 0.0))};
 }
 
 struct LayerCell {
   ivec3 cell;
-  Layer layer;
+  ThinLayer layer;
 };
 
 /// Moments of the geometry per cell.
@@ -80,7 +89,7 @@ class MomentGrid {
 
   /// The cells that lie in thin layers, in order of first use.
   std::vector<LayerCell> find_layers() const {
-    std::vector<std::optional<Layer>> layers(cells_.size());
+    std::vector<std::optional<ThinLayer>> layers(cells_.size());
     parallel_for(cells_.size(), 256, [&](size_t begin, size_t end) {
       for (size_t i = begin; i < end; ++i) layers[i] = thin_layer(around(cells_[i].coordinate));
     });
@@ -124,16 +133,18 @@ struct LayerSeen {
   bool is_opaque() const { return transmission <= kMostTransmission; }
 };
 
-/// By rays at a disc around the layer's middle.
-LayerSeen look_at(const OpacityScene& scene, const Layer& layer, double resolution, double disc, SplitMix& random) {
+/// By rays at a disc around the layer's middle, from so high on either side to as far below.
+LayerSeen look_at(const OpacityScene& scene, const Layer& layer, double resolution, double disc, double height,
+                  SplitMix& random) {
   const BasicFrame<double> frame(layer.normal);
   double stopped = 0, cosines = 0, transmission = 0;
   for (uint32_t i = 0; i < kRays; ++i) {
     const double radius = disc * std::sqrt(random.next_unit()), turn = 2 * M_PI * random.next_unit();
     const double side = i % 2 == 0 ? 1 : -1;
-    const dvec3 start = layer.middle + frame.to_world({radius * std::cos(turn), radius * std::sin(turn), side});
+    const dvec3 start =
+        layer.middle + frame.to_world({radius * std::cos(turn), radius * std::sin(turn), height * side});
     const auto hit = scene.first_stop(vec3(start * resolution), vec3(-side * layer.normal),
-                                      static_cast<float>(2 * resolution), random);
+                                      static_cast<float>(2 * height * resolution), random);
     if (!hit) continue;
     const dvec3 normal(hit->normal);
     const double length = glm::length(normal);
@@ -147,11 +158,28 @@ LayerSeen look_at(const OpacityScene& scene, const Layer& layer, double resoluti
 
 LayerSeen look_at(const OpacityScene& scene, const Layer& layer, double resolution, uint64_t seed) {
   SplitMix random(seed);
-  LayerSeen seen = look_at(scene, layer, resolution, kDisc, random);
+  LayerSeen seen = look_at(scene, layer, resolution, kDisc, 1, random);
   if (seen.is_part_of_sheet()) {
-    seen.covered_nearby = look_at(scene, layer, resolution, kSmallDisc, random).covered;
+    seen.covered_nearby = look_at(scene, layer, resolution, kSmallDisc, 1, random).covered;
   }
   return seen;
+}
+
+/// Per layer: whether it has a core, an opaque part of this surface that runs along inside it.
+Result<std::vector<uint8_t>> find_cores(const std::vector<LayerCell>& cells, const Surface& macrosurface,
+                                        double resolution) {
+  std::vector<uint8_t> has_core(cells.size(), 0);
+  if (macrosurface.triangles.empty()) return has_core;
+  FARFIELD_TRY_LET(const auto scene, OpacityScene::build(macrosurface));
+  parallel_for(cells.size(), 16, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      SplitMix random(mix64(i));
+      const double height = kInsideLayer * cells[i].layer.spread + kFlat;
+      const LayerSeen seen = look_at(scene, cells[i].layer, resolution, kDisc, height, random);
+      has_core[i] = seen.covered >= kLeastCore && seen.alignment >= kLeastAlignment && seen.is_opaque();
+    }
+  });
+  return has_core;
 }
 
 /// Layers that go on from cell to cell. What is no part of a sheet is alone.
@@ -216,11 +244,11 @@ class LayerGrid {
     }
   }
 
-  bool owns(const dvec3& point) const {
+  bool owns(const dvec3& point, double highest) const {
     const auto found = near_.find(cell_key(ivec3(glm::floor(point))));
     if (found == near_.end()) return false;
     for (const uint32_t i : found->second) {
-      if (answers_for(layers_[i], point)) return true;
+      if (answers_for(layers_[i], point, highest)) return true;
     }
     return false;
   }
@@ -248,12 +276,20 @@ std::vector<uint8_t> faces_mostly_in(const Surface& geometry, double unit, const
   return result;
 }
 
+/// Per face: 1 where these layers answer for most of its area, no higher than this above their planes.
+std::vector<uint8_t> faces_owned(const Surface& geometry, double resolution, std::vector<Layer> layers,
+                                 double highest) {
+  const LayerGrid grid(std::move(layers));
+  return faces_mostly_in(geometry, resolution, [&](const dvec3& point) { return grid.owns(point, highest); });
+}
+
 }  // namespace
 
-Result<std::vector<WallKind>> find_walls(const Surface& geometry, double resolution) {
-  std::vector<WallKind> kinds(geometry.triangles.size(), WallKind::None);
+Result<Walls> find_walls(const Surface& geometry, const Surface& macrosurface, double resolution) {
+  Walls walls{std::vector<WallKind>(geometry.triangles.size(), WallKind::None),
+              std::vector<uint8_t>(macrosurface.triangles.size(), 0)};
   const std::vector<LayerCell> cells = MomentGrid(geometry, resolution).find_layers();
-  if (cells.empty()) return kinds;
+  if (cells.empty()) return walls;
 
   FARFIELD_TRY_LET(const auto scene, OpacityScene::build(geometry));
   std::vector<LayerSeen> seen(cells.size());
@@ -261,25 +297,29 @@ Result<std::vector<WallKind>> find_walls(const Surface& geometry, double resolut
     for (size_t i = begin; i < end; ++i) seen[i] = look_at(scene, cells[i].layer, resolution, mix64(i));
   });
   const std::vector<uint8_t> is_sheet = find_sheets(cells, seen);
-  std::vector<Layer> closed, sheets;
+  FARFIELD_TRY_LET(const auto has_core, find_cores(cells, macrosurface, resolution));
+  std::vector<Layer> closed, sheets, with_core;
   for (size_t i = 0; i < cells.size(); ++i) {
-    if (is_sheet[i]) {
+    if (is_sheet[i] && !has_core[i]) {
       sheets.push_back(cells[i].layer);
-    } else if (seen[i].is_closed()) {
+    } else if (is_sheet[i] || seen[i].is_closed()) {
       closed.push_back(cells[i].layer);
+      if (has_core[i]) with_core.push_back(cells[i].layer);
     }
   }
   const auto mark = [&](std::vector<Layer> layers, WallKind kind) {
     if (layers.empty()) return;
-    const LayerGrid grid(std::move(layers));
-    const auto is_owned = faces_mostly_in(geometry, resolution, [&](const dvec3& point) { return grid.owns(point); });
-    for (size_t f = 0; f < kinds.size(); ++f) {
-      if (is_owned[f]) kinds[f] = kind;
+    const auto is_owned = faces_owned(geometry, resolution, std::move(layers), kNearPlane);
+    for (size_t f = 0; f < is_owned.size(); ++f) {
+      if (is_owned[f]) walls.kinds[f] = kind;
     }
   };
   mark(std::move(sheets), WallKind::HalfOpen);
   mark(std::move(closed), WallKind::Closed);  // has the last say
-  return kinds;
+  if (!with_core.empty()) {
+    walls.is_core = faces_owned(macrosurface, resolution, std::move(with_core), kAtLayer);
+  }
+  return walls;
 }
 
 std::vector<uint8_t> find_near(const Surface& geometry, const Surface& surface, const std::vector<uint8_t>& is_marked,

@@ -16,7 +16,12 @@ enum class WallKind : uint8_t {
   HalfOpen,  ///< planks apart, slats, wires: a sheet that lets many rays through
 };
 
-/// Per face: whether it is part of a wall at `resolution` (scene units, > 0).
+struct Walls {
+  std::vector<WallKind> kinds;   ///< per face of the geometry
+  std::vector<uint8_t> is_core;  ///< per face of the macrosurface
+};
+
+/// Which faces are part of a wall at `resolution` (scene units, > 0), beside the macrosurface of that resolution.
 ///
 /// A place is wall if all geometry within about 1.5 resolutions of it lies in a layer that is thin against the
 /// resolution, covers most of a disc there when looked at along the layer's normal, mostly with faces that lie in the
@@ -25,8 +30,11 @@ enum class WallKind : uint8_t {
 /// all open alike, which leaves, scales and feathers are not. Faces of whose area most lies close to such places are of
 /// the wall.
 ///
+/// Where a surface runs inside the layer, as masonry does between bricks, the wall is closed, whatever its pieces leave
+/// open, and that surface is its core: a sheet between the pieces would be behind it.
+///
 /// Deterministic for any thread count. Errors: those of OpacityScene::build().
-Result<std::vector<WallKind>> find_walls(const Surface& geometry, double resolution);
+Result<Walls> find_walls(const Surface& geometry, const Surface& macrosurface, double resolution);
 
 /// Per face of `geometry`: 1 where most of its area is within about `distance` (> 0) of faces of `surface` that are
 /// marked in `is_marked`. Deterministic for any thread count.

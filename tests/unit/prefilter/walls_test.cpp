@@ -19,10 +19,11 @@ namespace {
 using namespace test;
 
 double part_of(WallKind kind, const Surface& surface, double resolution) {
-  const auto kinds = find_walls(surface, resolution);
-  EXPECT_TRUE(kinds);
-  EXPECT_EQ(kinds->size(), surface.triangles.size());
-  return static_cast<double>(std::ranges::count(*kinds, kind)) / static_cast<double>(kinds->size());
+  const auto walls = find_walls(surface, {}, resolution);
+  EXPECT_TRUE(walls);
+  EXPECT_EQ(walls->kinds.size(), surface.triangles.size());
+  EXPECT_TRUE(walls->is_core.empty());
+  return static_cast<double>(std::ranges::count(walls->kinds, kind)) / static_cast<double>(walls->kinds.size());
 }
 /// Of closed walls.
 double wall_part(const Surface& surface, double resolution) { return part_of(WallKind::Closed, surface, resolution); }
@@ -82,6 +83,36 @@ TEST(Walls, OneBoardIsNone) {
   add_box(board, vec3(0), {1, 20, 0.2f});
   add_materials(board);
   EXPECT_EQ(wall_part(board, 2), 0.0);
+}
+
+TEST(Walls, ASurfaceInsideIsTheirCoreAndClosesThem) {
+  const auto wall_at = [](float z) {
+    Surface surface;
+    add_quad(surface, {-1, -1, z}, {21, -1, z}, {21, 21, z}, {-1, 21, z});
+    add_materials(surface);
+    return surface;
+  };
+  for (const float gap : {0.02f, 0.5f}) {
+    const auto with_core = find_walls(make_boards(gap), wall_at(0.1f), 2);
+    ASSERT_TRUE(with_core);
+    EXPECT_EQ(std::ranges::count(with_core->kinds, WallKind::Closed), 20 * 12) << gap;
+    EXPECT_EQ(with_core->is_core, std::vector<uint8_t>(2, 1)) << gap;
+    const auto before_another = find_walls(make_boards(gap), wall_at(1.5f), 2);
+    ASSERT_TRUE(before_another);
+    EXPECT_EQ(std::ranges::count(before_another->kinds, gap < 0.1f ? WallKind::Closed : WallKind::HalfOpen), 20 * 12);
+    EXPECT_EQ(before_another->is_core, std::vector<uint8_t>(2, 0)) << gap;
+  }
+}
+
+TEST(Walls, ACoreThatLetsLightThroughIsNone) {
+  Surface pane;
+  add_quad(pane, {-1, -1, 0.1f}, {21, -1, 0.1f}, {21, 21, 0.1f}, {-1, 21, 0.1f});
+  add_materials(pane);
+  for (FaceMaterial& m : pane.materials) m.transmission = vec3(0.3f);
+  const auto walls = find_walls(make_boards(0.5f), pane, 2);
+  ASSERT_TRUE(walls);
+  EXPECT_EQ(std::ranges::count(walls->kinds, WallKind::HalfOpen), 20 * 12);
+  EXPECT_EQ(walls->is_core, std::vector<uint8_t>(2, 0));
 }
 
 TEST(Walls, AFewVoxelsAreNoHalfOpenOne) {
@@ -149,14 +180,14 @@ TEST(Walls, WhatLetsLightThroughIsNone) {
 
 TEST(Walls, FacesWithoutAreaDoNoHarm) {
   Surface nothing;
-  EXPECT_TRUE(find_walls(nothing, 1)->empty());
+  EXPECT_TRUE(find_walls(nothing, nothing, 1)->kinds.empty());
   Surface boards = make_boards(0.02f);
   boards.triangles.emplace_back(0, 1, 1);
   boards.materials.push_back(boards.materials[0]);
-  const auto kinds = find_walls(boards, 2);
-  ASSERT_TRUE(kinds);
-  EXPECT_EQ(kinds->back(), WallKind::None);
-  EXPECT_EQ(kinds->front(), WallKind::Closed);
+  const auto walls = find_walls(boards, nothing, 2);
+  ASSERT_TRUE(walls);
+  EXPECT_EQ(walls->kinds.back(), WallKind::None);
+  EXPECT_EQ(walls->kinds.front(), WallKind::Closed);
 }
 
 TEST(WallShell, ClosesGapsAndKeepsTheSize) {
