@@ -26,6 +26,8 @@ constexpr std::array<NamedLight, 5> kNames = {{{Light::Daylight, "daylight"},
 /// How far the suns in front and behind are from the camera's axis: no camera stands in its own sun, where every
 /// shadow is hidden.
 constexpr float kAside = kPi / 6.0f;
+/// 20 degrees from +y: along what stands upright light meets nearly nothing.
+constexpr vec3 kAbove{0.23f, 0.94f, 0.25f};
 
 /// Towards the sun, unit.
 vec3 sun_direction(Light light, const OrthoView& view) {
@@ -36,7 +38,7 @@ vec3 sun_direction(Light light, const OrthoView& view) {
     case Light::Behind:
       return aside + std::cos(kAside) * view.direction;
     default:
-      return {0.0f, 1.0f, 0.0f};
+      return glm::normalize(kAbove);
   }
 }
 

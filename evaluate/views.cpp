@@ -5,14 +5,18 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <glm/gtc/quaternion.hpp>
 #include <span>
 #include <utility>
 
 namespace farfield {
 namespace {
 
-/// Vertices of the regular icosahedron, unit.
+/// Vertices of the regular icosahedron, unit, turned so that none is within 6 degrees of a coordinate plane nor within
+/// 4 of one through an axis and halfway between the others: what people build stands along axes, and in those planes
+/// its parts hide behind one another or are seen edge-on, which no other view sees (docs/decisions/0040).
 std::array<vec3, 12> icosahedron_vertices() {
+  const auto turn = glm::mat3_cast(glm::normalize(glm::quat(-0.65f, -0.12f, -0.75f, 0.10f)));
   const float golden = 0.5f * (1.0f + std::sqrt(5.0f));
   std::array<vec3, 12> vertices;
   size_t next = 0;
@@ -22,7 +26,7 @@ std::array<vec3, 12> icosahedron_vertices() {
         vec3 v(0.0f);
         v[(axis + 1) % 3] = a;
         v[(axis + 2) % 3] = b;
-        vertices[next++] = glm::normalize(v);
+        vertices[next++] = turn * glm::normalize(v);
       }
   return vertices;
 }

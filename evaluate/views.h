@@ -21,7 +21,7 @@ struct OrthoView {
   float width() const { return pixel_size * static_cast<float>(width_px); }  ///< orthographic width, scene units
 };
 
-/// `count` directions (unit, the way the camera looks) spread over the sphere. Up to 12: vertices of the icosahedron
+/// `count` directions (unit, the way the camera looks) spread over the sphere. Up to 12: vertices of an icosahedron
 /// around the origin, its six axes from one side, then from the other; each as far as possible from those before it, so
 /// that a prefix is spread too. More: a Fibonacci lattice. Count <= 0: none.
 std::vector<vec3> view_directions(int count);

@@ -51,6 +51,18 @@ TEST(ViewDirections, SixAreTheAxesOfTheIcosahedron) {
   EXPECT_LT(glm::length(sum), 2.5f);  // not all from one side
 }
 
+TEST(ViewDirections, NoneOfTheIcosahedronIsNearAPlaneThatThingsAreBuiltAlong) {
+  for (const vec3& direction : view_directions(12)) {
+    for (int axis = 0; axis < 3; ++axis) {
+      EXPECT_GT(std::abs(direction[axis]), std::sin(6 * kPi / 180)) << axis;
+      for (const float sign : {1.0f, -1.0f}) {
+        const float across = direction[(axis + 1) % 3] + sign * direction[(axis + 2) % 3];
+        EXPECT_GT(std::abs(across) / std::sqrt(2.0f), std::sin(4 * kPi / 180)) << axis;
+      }
+    }
+  }
+}
+
 TEST(ViewDirections, ManyAverageToNothing) {
   for (const int count : {12, 13, 100, 1000}) {
     vec3 mean(0.0f);
