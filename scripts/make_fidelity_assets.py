@@ -262,20 +262,22 @@ ASSETS = {"planks_00": lambda: planks(0), "planks_02": lambda: planks(0.02), "pl
           "feathers": feathers, "ivy": ivy, "hair": hair, "leaves": leaves}
 
 
-def main():
-    if len(sys.argv) < 2 or sys.argv[1].startswith("-"):
-        sys.exit(__doc__)
-    folder, names = Path(sys.argv[1]), [name for name in sys.argv[2:] if name != "--turned"] or list(ASSETS)
-    unknown = [name for name in names if name not in ASSETS]
+def write_assets(assets, materials, usage, turned):
+    """What the command line asks for: FOLDER [NAME...]. turned: every tube about its axis by a random angle."""
+    arguments = [argument for argument in sys.argv[1:] if argument != "--turned"]
+    if not arguments or arguments[0].startswith("-"):
+        sys.exit(usage)
+    folder, names = Path(arguments[0]), arguments[1:] or list(assets)
+    unknown = [name for name in names if name not in assets]
     if unknown:
-        sys.exit("make_fidelity_assets: no asset %s; there are %s" % (", ".join(unknown), ", ".join(ASSETS)))
+        sys.exit("%s: no asset %s; there are %s" % (Path(sys.argv[0]).stem, ", ".join(unknown), ", ".join(assets)))
     folder.mkdir(parents=True, exist_ok=True)
     for name in names:
-        Mesh.turns = random.Random(1) if "--turned" in sys.argv else None
-        mesh = ASSETS[name]()
-        mesh.write(folder / (name + ".glb"), MATERIALS)
+        Mesh.turns = random.Random(1) if turned else None
+        mesh = assets[name]()
+        mesh.write(folder / (name + ".glb"), materials)
         print("%s: %d faces" % (folder / (name + ".glb"), len(mesh.faces)))
 
 
 if __name__ == "__main__":
-    main()
+    write_assets(ASSETS, MATERIALS, __doc__, "--turned" in sys.argv)
