@@ -14,7 +14,7 @@
 namespace farfield {
 
 /// Goes up when measure_volume() or pack_volume() give other results.
-inline constexpr uint32_t kVoxelizeVersion = 18;
+inline constexpr uint32_t kVoxelizeVersion = 19;
 
 /// Refers to the surfaces. Immutable; any thread.
 struct VolumeJob {

@@ -2,6 +2,7 @@
 #include "prefilter/line_scene.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "base/hash.h"
@@ -13,6 +14,7 @@ namespace {
 
 /// In voxels: a hit where no voxel is stored counts for a voxel this close on its line.
 constexpr double kNearby = 2;
+constexpr float kFar = std::numeric_limits<float>::infinity();
 
 }  // namespace
 
@@ -57,6 +59,23 @@ SeenLine LineScene::cast(const VoxelRay& ray, SplitMix& random) const {
   return line;
 }
 
+SeenLine LineScene::cast_on(const vec3& from, const vec3& direction, float near, SplitMix& random) const {
+  SeenLine line;
+  line.origin = from + near * direction;
+  line.direction = direction;
+  line.ray = {(dvec3(line.origin) - lattice_.origin) / lattice_.voxel_size, dvec3(direction), 0, kFar};
+  float far = kFar;
+  if (macrosurface_scene_) {
+    if (const auto wall = macrosurface_scene_->first_stop(line.origin, direction, far, random)) {
+      far = wall->distance;
+      line.ray.far = static_cast<double>(far) / lattice_.voxel_size;
+    }
+  }
+  line.hit = geometry_->first_stop(line.origin, direction, far, random);
+  if (line.hit) line.hit_at = static_cast<double>(line.hit->distance) / lattice_.voxel_size;
+  return line;
+}
+
 std::optional<uint32_t> LineScene::voxel_of_hit(const SeenLine& line) const {
   std::optional<uint32_t> found;
   VoxelRay before = line.ray, behind = line.ray;
@@ -65,6 +84,18 @@ std::optional<uint32_t> LineScene::voxel_of_hit(const SeenLine& line) const {
   if (found) return found;
   behind.near = line.hit_at, behind.far = line.hit_at + kNearby;
   grid_.walk(behind, [&](uint32_t voxel, double, double) { return found = voxel, false; });
+  return found;
+}
+
+std::optional<Collision> first_collision(const SparseVolume& volume, const VoxelGrid& grid, const VoxelRay& ray,
+                                         SplitMix& random) {
+  double left = -std::log1p(-random.next_unit());
+  std::optional<Collision> found;
+  walk_octant_depths(volume, grid, ray, [&](const OctantStretch& at, double depth) {
+    if (depth > left) found = {at.voxel, at.enter + left / depth * (at.leave - at.enter)};
+    left -= depth;
+    return !found;
+  });
   return found;
 }
 

@@ -42,6 +42,9 @@ class LineScene {
 
   /// `ray` starts on the surface of grid().box(). `random` is used only where faces are not opaque.
   SeenLine cast(const VoxelRay& ray, SplitMix& random) const;
+  /// Light that goes on from this point, `near` away from it, and what it sees of the geometry; its ray ends where the
+  /// macrosurface stops it.
+  SeenLine cast_on(const vec3& from, const vec3& direction, float near, SplitMix& random) const;
   /// The stored voxel that a hit belongs to: the one where it is or, if that is not stored, one close by on the line.
   std::optional<uint32_t> voxel_of_hit(const SeenLine& line) const;
 
@@ -128,6 +131,14 @@ void visit_depths(const SparseVolume& volume, const VoxelGrid& grid, const Voxel
     return true;
   });
 }
+
+/// Where the medium stops a line first.
+struct Collision {
+  uint32_t voxel = 0;
+  double at = 0;  ///< along the line's ray, in voxels
+};
+std::optional<Collision> first_collision(const SparseVolume& volume, const VoxelGrid& grid, const VoxelRay& ray,
+                                         SplitMix& random);
 
 inline double optical_depth(const SparseVolume& volume, const VoxelGrid& grid, const VoxelRay& ray) {
   double depth = 0;

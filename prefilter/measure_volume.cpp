@@ -6,6 +6,7 @@
 #include "base/hash.h"
 #include "prefilter/isotropic_lines.h"
 #include "prefilter/line_scene.h"
+#include "prefilter/match_sky.h"
 #include "prefilter/self_shadowing.h"
 #include "prefilter/thin_out.h"
 #include "prefilter/visible_density.h"
@@ -14,7 +15,7 @@ namespace farfield {
 namespace {
 
 /// Share of the time up to the end of each step.
-constexpr double kVoxelizeDone = 0.5, kMatchDone = 0.9;
+constexpr double kVoxelizeDone = 0.5, kMatchDone = 0.85, kEscapeDone = 0.95;
 
 /// Lines per step: about half of rays_per_voxel through each voxel. Never more than an eighth of the rays of the
 /// local measurement, as these are short; but a coarse level can afford enough for single voxels to show.
@@ -42,7 +43,9 @@ Result<SparseVolume> measure_volume(const Surface& geometry, const Surface& macr
   FARFIELD_TRY_LET(const auto scene, LineScene::build(geometry_scene, macrosurface, volume));
   const double lines = line_count(scene, volume, options.rays_per_voxel);
   FARFIELD_TRY(match_visible_density(scene, volume, {lines, mix64(options.seed, 1), step(kVoxelizeDone, kMatchDone)}));
-  FARFIELD_TRY(measure_self_shadowing(scene, volume, {lines / 2, mix64(options.seed, 2), step(kMatchDone, 1)}));
+  FARFIELD_TRY(
+      measure_self_shadowing(scene, volume, {lines / 2, mix64(options.seed, 2), step(kMatchDone, kEscapeDone)}));
+  FARFIELD_TRY(match_sky(scene, volume, {mix64(options.seed, 3), step(kEscapeDone, 1)}));
   return thin_out(volume, options.seed);
 }
 

@@ -19,30 +19,11 @@
 namespace farfield {
 namespace {
 
-/// In voxels: light that goes on starts this far from the face it leaves.
-constexpr float kClearance = 1e-3f;
 constexpr float kFar = std::numeric_limits<float>::infinity();
 /// What the measurement of a brick counts in each of its voxels, in hits or in light of weight 1 that is sent on.
 constexpr double kPriorLight = 64;
 /// Sides of which light shows no spread along an axis say nothing about it: a share of their spread in all.
 constexpr double kLeastSpread = 1e-2;
-
-/// Where the medium stops a line first.
-struct Collision {
-  uint32_t voxel = 0;
-  double at = 0;  ///< along the line's ray, in voxels
-};
-std::optional<Collision> first_collision(const SparseVolume& volume, const LineScene& scene, const SeenLine& line,
-                                         SplitMix& random) {
-  double left = -std::log1p(-random.next_unit());
-  std::optional<Collision> found;
-  walk_octant_depths(volume, scene.grid(), line.ray, [&](const OctantStretch& at, double depth) {
-    if (depth > left) found = {at.voxel, at.enter + left / depth * (at.leave - at.enter)};
-    left -= depth;
-    return !found;
-  });
-  return found;
-}
 
 /// How much light gets away from what is seen of something.
 struct Escape {
@@ -173,7 +154,7 @@ class EscapeMeasurement {
     }
     return shrunk_ratios(volume_, sums, kPriorLight);
   }
-  float near() const { return kClearance * static_cast<float>(scene_.lattice().voxel_size); }
+  float near() const { return kSentClearance * static_cast<float>(scene_.lattice().voxel_size); }
 
   const LineScene& scene_;
   const SparseVolume& volume_;
@@ -192,7 +173,7 @@ void EscapeMeasurement::add_source(const SeenLine& line, SplitMix& random) {
 }
 
 void EscapeMeasurement::add_medium(const SeenLine& line, SplitMix& random) {
-  const auto collision = first_collision(volume_, scene_, line, random);
+  const auto collision = first_collision(volume_, scene_.grid(), line.ray, random);
   if (!collision) return;
   const auto sent = scattered_by_medium(volume_.voxels[collision->voxel], line, random);
   const dvec3 at = line.ray.origin + collision->at * line.ray.direction;

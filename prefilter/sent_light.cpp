@@ -110,6 +110,7 @@ std::optional<SentOn> scattered(const Material& m, const Normals& normals, const
     sent.color = (vec3(1.0f) - mirror) * (m.diffuse + m.transmission) * (all / of_base);
   }
   sent.weight *= all;
+  sent.light = sent.kind == SentOn::Kind::Highlight ? sent.weight / of_mirror * mirror : sent.color;
   return sent;
 }
 

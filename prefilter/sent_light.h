@@ -9,11 +9,15 @@
 
 namespace farfield {
 
+/// In voxels: it starts this far from the face that it leaves.
+inline constexpr float kSentClearance = 1e-3f;
+
 /// Light that goes on from what a line sees first.
 struct SentOn {
   vec3 direction{0.0f};
   float weight = 0;  ///< how much light
   vec3 color{0.0f};  ///< of the base's light: its weight by channel
+  vec3 light{0.0f};  ///< the weight by channel, of the highlight, too
   enum class Kind { Highlight, Reflected, Through } kind = Kind::Highlight;
   bool is_lost = false;  ///< into the surface itself
   float contrast = 0;  ///< of reflected light, how much it is on the viewer's side: L less its mean; the phase's cosine
