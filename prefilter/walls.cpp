@@ -40,11 +40,11 @@ constexpr double kSameNormal = 0.9, kSamePlane = 0.35;  ///< cosine, distance: o
 constexpr double kMostTransmission = 0.02;              ///< mean albedo of what stops them
 constexpr double kNearPlane = 0.75, kNearMiddle = 2.0;  ///< what a layer's middle answers for
 constexpr int kNearCells = 3;                           ///< cells around it that reach so far
-constexpr double kInsideLayer =
-    1.3;                          ///< height over its plane, by the pieces' standard deviation; they reach 1.7 if even
-constexpr double kAtLayer = 0.5;  ///< the same in resolutions, of what goes with such a core
-constexpr double kFlat = 0.02;    ///< beside that, for pieces without thickness
-constexpr double kLeastCore = 0.5;  ///< share of the disc's rays that a core stops
+// Of a layer's core. Pieces that fill a layer evenly reach 1.7 standard deviations of their heights.
+constexpr double kInsideLayer = 1.3;  ///< of these, above its plane
+constexpr double kFlat = 0.02;        ///< beside that, for pieces without thickness
+constexpr double kLeastCore = 0.5;    ///< share of the disc's rays that it stops
+constexpr double kAtLayer = 0.5;      ///< what is of the same surface and no higher goes with it
 
 /// Whether a layer's middle answers for a point no higher above its plane than this.
 bool answers_for(const Layer& layer, const dvec3& point, double highest) {

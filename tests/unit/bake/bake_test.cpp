@@ -102,7 +102,7 @@ ImportedAsset ball_in_leaves() {
 }
 
 /// 24 sheets of 1 x 24 with gaps, of 24 quads each.
-ImportedAsset boards(float gap = 0.06f) {
+Surface boards_apart(float gap) {
   Surface surface;
   for (uint32_t board = 0; board < 24; ++board) {
     const Surface sheet = test::make_plane(1, 24, 1 - gap, 24.0f);
@@ -111,7 +111,23 @@ ImportedAsset boards(float gap = 0.06f) {
     for (const uvec3& t : sheet.triangles) surface.triangles.push_back(t + first);
   }
   test::add_materials(surface);
-  return test::asset_of(surface, 78);
+  return surface;
+}
+ImportedAsset boards(float gap = 0.06f) { return test::asset_of(boards_apart(gap), 78); }
+
+/// Such boards, half of them gaps, on both sides of a black wall.
+ImportedAsset boards_around_a_wall() {
+  Surface surface = test::make_plane(24, 24, 24.0f, 24.0f);
+  const size_t black = surface.triangles.size();
+  const Surface row = boards_apart(0.5f);
+  for (const float z : {-0.2f, 0.2f}) {
+    const auto first = static_cast<uint32_t>(surface.positions.size());
+    for (const vec3& p : row.positions) surface.positions.push_back(p + vec3(0, 0, z));
+    for (const uvec3& t : row.triangles) surface.triangles.push_back(t + first);
+  }
+  test::add_materials(surface);
+  for (size_t f = 0; f < black; ++f) surface.materials[f].diffuse = vec3(0.0f);
+  return test::asset_of(surface, 79);
 }
 
 ImportedAsset two_triangles(float grey = 0.5f) {
@@ -497,6 +513,27 @@ TEST_F(Bake, OfBoardsApartIsASheetWithGaps) {
     EXPECT_EQ(sheet.face_gap.size(), face_count(sheet));
   }
   EXPECT_TRUE(levels[3]->view().has_volume());  // so few voxels are no wall
+}
+
+TEST_F(Bake, OfBoardsAroundAWallShowsBoth) {
+  BakeOptions options = small_options();
+  options.finest_grid = 16;
+  options.measure_resident = [](const LevelView& level) {  // all levels pay
+    return Result<LevelCost>(LevelCost{uint64_t{1000000} >> level.header.level, 1});
+  };
+  const auto report = bake(boards_around_a_wall(), "boards.obj", out(), options);
+  ASSERT_TRUE(report) << report.error().message;
+  const auto levels = open_levels(out());
+  ASSERT_EQ(levels.size(), 4u);
+  for (const size_t grid_16_or_8 : {1u, 2u}) {
+    const LevelView& wall = levels[grid_16_or_8]->view();
+    EXPECT_FALSE(wall.has_volume());
+    EXPECT_TRUE(wall.face_sheet_shape.empty());  // a sheet between the boards would be in the wall
+    double sum = 0;
+    for (const PackedColor& color : wall.face_diffuse) sum += unpack_color(color).x;
+    // Boards of 0.5 hide half of the wall and a little more from rays aslant.
+    EXPECT_NEAR(sum / static_cast<double>(wall.face_diffuse.size()), 0.27, 0.05);
+  }
 }
 
 TEST_F(Bake, OfTheSourceOnlyHasNoOtherLevel) {
