@@ -63,6 +63,16 @@ BakeOptions small_options() {
   return options;
 }
 
+/// Three levels, of which each is stored.
+BakeOptions all_pay_from_16() {
+  BakeOptions options = small_options();
+  options.finest_grid = 16;
+  options.measure_resident = [](const LevelView& level) {
+    return Result<LevelCost>(LevelCost{uint64_t{1000000} >> level.header.level, 1});
+  };
+  return options;
+}
+
 /// A ball of 2 * 32 * 16 triangles inside a cloud of leaves: surface at fine levels, leaves that become volume.
 ImportedAsset ball_in_leaves() {
   test::LeafCloud cloud;
@@ -497,12 +507,7 @@ TEST_F(Bake, OfBoardsWithNarrowGapsStaysASurface) {
 }
 
 TEST_F(Bake, OfBoardsApartIsASheetWithGaps) {
-  BakeOptions options = small_options();
-  options.finest_grid = 16;
-  options.measure_resident = [](const LevelView& level) {  // all levels pay
-    return Result<LevelCost>(LevelCost{uint64_t{1000000} >> level.header.level, 1});
-  };
-  const auto report = bake(boards(0.5f), "boards.obj", out(), options);
+  const auto report = bake(boards(0.5f), "boards.obj", out(), all_pay_from_16());
   ASSERT_TRUE(report) << report.error().message;
   const auto levels = open_levels(out());
   ASSERT_EQ(levels.size(), 4u);
@@ -516,12 +521,7 @@ TEST_F(Bake, OfBoardsApartIsASheetWithGaps) {
 }
 
 TEST_F(Bake, OfBoardsAroundAWallShowsBoth) {
-  BakeOptions options = small_options();
-  options.finest_grid = 16;
-  options.measure_resident = [](const LevelView& level) {  // all levels pay
-    return Result<LevelCost>(LevelCost{uint64_t{1000000} >> level.header.level, 1});
-  };
-  const auto report = bake(boards_around_a_wall(), "boards.obj", out(), options);
+  const auto report = bake(boards_around_a_wall(), "boards.obj", out(), all_pay_from_16());
   ASSERT_TRUE(report) << report.error().message;
   const auto levels = open_levels(out());
   ASSERT_EQ(levels.size(), 4u);
