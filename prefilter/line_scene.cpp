@@ -2,10 +2,10 @@
 #include "prefilter/line_scene.h"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "base/hash.h"
+#include "base/nonfinite.h"
 #include "base/parallel_job.h"
 #include "prefilter/isotropic_lines.h"
 
@@ -14,7 +14,6 @@ namespace {
 
 /// In voxels: a hit where no voxel is stored counts for a voxel this close on its line.
 constexpr double kNearby = 2;
-constexpr float kFar = std::numeric_limits<float>::infinity();
 
 }  // namespace
 
@@ -38,8 +37,18 @@ void LineScene::add_macrosurface(OpacityScene scene, const Box3& bounds) {
   before_ += glm::length(upper - lower);
 }
 
-double LineScene::along_ray(const VoxelRay& ray, float distance) const {
-  return std::clamp(static_cast<double>(distance) / lattice_.voxel_size - before_, 0.0, ray.far);
+void LineScene::look(SeenLine& line, float far, double before, SplitMix& random) const {
+  const auto along_ray = [&](float distance) {
+    return std::clamp(static_cast<double>(distance) / lattice_.voxel_size - before, 0.0, line.ray.far);
+  };
+  if (macrosurface_scene_) {
+    if (const auto wall = macrosurface_scene_->first_stop(line.origin, line.direction, far, random)) {
+      far = wall->distance;
+      line.ray.far = along_ray(far);
+    }
+  }
+  line.hit = geometry_->first_stop(line.origin, line.direction, far, random);
+  if (line.hit) line.hit_at = along_ray(line.hit->distance);
 }
 
 SeenLine LineScene::cast(const VoxelRay& ray, SplitMix& random) const {
@@ -47,15 +56,7 @@ SeenLine LineScene::cast(const VoxelRay& ray, SplitMix& random) const {
   line.ray = ray;
   line.origin = vec3(lattice_.origin + (ray.origin - before_ * ray.direction) * lattice_.voxel_size);
   line.direction = glm::normalize(vec3(ray.direction));
-  auto far = static_cast<float>((before_ + ray.far) * lattice_.voxel_size);
-  if (macrosurface_scene_) {
-    if (const auto wall = macrosurface_scene_->first_stop(line.origin, line.direction, far, random)) {
-      far = wall->distance;
-      line.ray.far = along_ray(ray, far);
-    }
-  }
-  line.hit = geometry_->first_stop(line.origin, line.direction, far, random);
-  if (line.hit) line.hit_at = along_ray(line.ray, line.hit->distance);
+  look(line, static_cast<float>((before_ + ray.far) * lattice_.voxel_size), before_, random);
   return line;
 }
 
@@ -63,16 +64,8 @@ SeenLine LineScene::cast_on(const vec3& from, const vec3& direction, float near,
   SeenLine line;
   line.origin = from + near * direction;
   line.direction = direction;
-  line.ray = {(dvec3(line.origin) - lattice_.origin) / lattice_.voxel_size, dvec3(direction), 0, kFar};
-  float far = kFar;
-  if (macrosurface_scene_) {
-    if (const auto wall = macrosurface_scene_->first_stop(line.origin, direction, far, random)) {
-      far = wall->distance;
-      line.ray.far = static_cast<double>(far) / lattice_.voxel_size;
-    }
-  }
-  line.hit = geometry_->first_stop(line.origin, direction, far, random);
-  if (line.hit) line.hit_at = static_cast<double>(line.hit->distance) / lattice_.voxel_size;
+  line.ray = {(dvec3(line.origin) - lattice_.origin) / lattice_.voxel_size, dvec3(direction), 0, kInfinity};
+  look(line, kInfinity, 0, random);
   return line;
 }
 

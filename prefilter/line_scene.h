@@ -45,6 +45,10 @@ class LineScene {
   /// Light that goes on from this point, `near` away from it, and what it sees of the geometry; its ray ends where the
   /// macrosurface stops it.
   SeenLine cast_on(const vec3& from, const vec3& direction, float near, SplitMix& random) const;
+  /// The point so far along a ray through the volume, in the space of positions.
+  vec3 point_along(const VoxelRay& ray, double at) const {
+    return vec3(lattice_.origin + lattice_.voxel_size * (ray.origin + at * ray.direction));
+  }
   /// The stored voxel that a hit belongs to: the one where it is or, if that is not stored, one close by on the line.
   std::optional<uint32_t> voxel_of_hit(const SeenLine& line) const;
 
@@ -60,7 +64,8 @@ class LineScene {
  private:
   LineScene(const OpacityScene& geometry, const SparseVolume& volume);
   void add_macrosurface(OpacityScene scene, const Box3& bounds);
-  double along_ray(const VoxelRay& ray, float distance) const;
+  /// Fills in what a line sees whose ray begins `before` voxels behind its origin, and where it ends.
+  void look(SeenLine& line, float far, double before, SplitMix& random) const;
 
   const OpacityScene* geometry_;
   std::optional<OpacityScene> macrosurface_scene_;

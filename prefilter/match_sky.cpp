@@ -76,8 +76,7 @@ class LightPaths {
     const float of_direction = (is_highlight ? volume_.highlight_lean : volume_.hot_spot) * sent->slope +
                                glm::dot(volume_.open_side, sent->opening);
     const vec3 albedo = glm::min(layered_albedo(voxel.specular, voxel.diffuse + voxel.transmission), vec3(1.0f));
-    const dvec3 at = line.ray.origin + collision->at * line.ray.direction;
-    return Meeting{vec3(volume_.lattice.origin + volume_.lattice.voxel_size * at), sent->direction,
+    return Meeting{scene_.point_along(line.ray, collision->at), sent->direction,
                    std::max(1 + of_direction, 0.0f) * odds_gain(albedo, voxel.self_shadowing) * sent->light};
   }
 
@@ -101,8 +100,7 @@ class LightPaths {
         if (!(random.next_unit() < most)) return;
         light /= std::min(most, 1.0);
       }
-      const float near = kSentClearance * static_cast<float>(scene_.lattice().voxel_size);
-      line = scene_.cast_on(met->from, met->direction, near, random);
+      line = scene_.cast_on(met->from, met->direction, sent_clearance(scene_), random);
     }
   }
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <vector>
 
+#include "base/nonfinite.h"
 #include "prefilter/sent_light.h"
 #include "prefilter/voxel_ratios.h"
 #include "scattering/albedo.h"
@@ -19,7 +19,6 @@
 namespace farfield {
 namespace {
 
-constexpr float kFar = std::numeric_limits<float>::infinity();
 /// What the measurement of a brick counts in each of its voxels, in hits or in light of weight 1 that is sent on.
 constexpr double kPriorLight = 64;
 /// Sides of which light shows no spread along an axis say nothing about it: a share of their spread in all.
@@ -142,7 +141,7 @@ class EscapeMeasurement {
   void add_medium(const SeenLine& line, SplitMix& random);
   /// What the macrosurface stops it stops for both: it says nothing.
   bool meets_macrosurface(const vec3& from, const SentOn& sent, SplitMix& random) const {
-    return scene_.is_stopped_by_macrosurface(from, sent.direction, near(), kFar, random);
+    return scene_.is_stopped_by_macrosurface(from, sent.direction, near(), kInfinity, random);
   }
   /// Of each voxel's light, away / all, both of an Escape.
   template <typename Away, typename All>
@@ -154,7 +153,7 @@ class EscapeMeasurement {
     }
     return shrunk_ratios(volume_, sums, kPriorLight);
   }
-  float near() const { return kSentClearance * static_cast<float>(scene_.lattice().voxel_size); }
+  float near() const { return sent_clearance(scene_); }
 
   const LineScene& scene_;
   const SparseVolume& volume_;
@@ -168,7 +167,7 @@ void EscapeMeasurement::add_source(const SeenLine& line, SplitMix& random) {
   source_.of_voxel[*voxel].hits.add(1);
   if (!sent) return;
   const bool is_stopped =
-      sent->is_lost || scene_.is_stopped_by_geometry(line.point(), sent->direction, near(), kFar, random);
+      sent->is_lost || scene_.is_stopped_by_geometry(line.point(), sent->direction, near(), kInfinity, random);
   source_.add(*voxel, *sent, is_stopped ? 0 : 1);
 }
 
@@ -176,12 +175,11 @@ void EscapeMeasurement::add_medium(const SeenLine& line, SplitMix& random) {
   const auto collision = first_collision(volume_, scene_.grid(), line.ray, random);
   if (!collision) return;
   const auto sent = scattered_by_medium(volume_.voxels[collision->voxel], line, random);
-  const dvec3 at = line.ray.origin + collision->at * line.ray.direction;
-  const vec3 from(volume_.lattice.origin + volume_.lattice.voxel_size * at);
-  if (sent && meets_macrosurface(from, *sent, random)) return;
+  if (sent && meets_macrosurface(scene_.point_along(line.ray, collision->at), *sent, random)) return;
   medium_.of_voxel[collision->voxel].hits.add(1);
   if (!sent) return;
-  const VoxelRay away{at, dvec3(sent->direction), 0, kFar};
+  const dvec3 at = line.ray.origin + collision->at * line.ray.direction;
+  const VoxelRay away{at, dvec3(sent->direction), 0, kInfinity};
   medium_.add(collision->voxel, *sent, std::exp(-optical_depth(volume_, scene_.grid(), away)));
 }
 

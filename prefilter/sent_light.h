@@ -9,8 +9,8 @@
 
 namespace farfield {
 
-/// In voxels: it starts this far from the face that it leaves.
-inline constexpr float kSentClearance = 1e-3f;
+/// How far from the face that it leaves light starts.
+inline float sent_clearance(const LineScene& scene) { return 1e-3f * static_cast<float>(scene.lattice().voxel_size); }
 
 /// Light that goes on from what a line sees first.
 struct SentOn {

@@ -165,14 +165,15 @@ LayerSeen look_at(const OpacityScene& scene, const Layer& layer, double resoluti
   return seen;
 }
 
-/// Per layer: whether it has a core, an opaque part of this surface that runs along inside it.
-Result<std::vector<uint8_t>> find_cores(const std::vector<LayerCell>& cells, const Surface& macrosurface,
-                                        double resolution) {
+/// Per layer that is_wall: whether it has a core, an opaque part of this surface that runs along inside it.
+Result<std::vector<uint8_t>> find_cores(const std::vector<LayerCell>& cells, const std::vector<uint8_t>& is_wall,
+                                        const Surface& macrosurface, double resolution) {
   std::vector<uint8_t> has_core(cells.size(), 0);
-  if (macrosurface.triangles.empty()) return has_core;
+  if (macrosurface.triangles.empty() || std::ranges::count(is_wall, 1) == 0) return has_core;
   FARFIELD_TRY_LET(const auto scene, OpacityScene::build(macrosurface));
   parallel_for(cells.size(), 16, [&](size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
+      if (!is_wall[i]) continue;
       SplitMix random(mix64(i));
       const double height = kInsideLayer * cells[i].layer.spread + kFlat;
       const LayerSeen seen = look_at(scene, cells[i].layer, resolution, kDisc, height, random);
@@ -297,15 +298,14 @@ Result<Walls> find_walls(const Surface& geometry, const Surface& macrosurface, d
     for (size_t i = begin; i < end; ++i) seen[i] = look_at(scene, cells[i].layer, resolution, mix64(i));
   });
   const std::vector<uint8_t> is_sheet = find_sheets(cells, seen);
-  FARFIELD_TRY_LET(const auto has_core, find_cores(cells, macrosurface, resolution));
+  std::vector<uint8_t> is_wall(cells.size());
+  for (size_t i = 0; i < cells.size(); ++i) is_wall[i] = is_sheet[i] || seen[i].is_closed();
+  FARFIELD_TRY_LET(const auto has_core, find_cores(cells, is_wall, macrosurface, resolution));
   std::vector<Layer> closed, sheets, with_core;
   for (size_t i = 0; i < cells.size(); ++i) {
-    if (is_sheet[i] && !has_core[i]) {
-      sheets.push_back(cells[i].layer);
-    } else if (is_sheet[i] || seen[i].is_closed()) {
-      closed.push_back(cells[i].layer);
-      if (has_core[i]) with_core.push_back(cells[i].layer);
-    }
+    if (!is_wall[i]) continue;
+    (is_sheet[i] && !has_core[i] ? sheets : closed).push_back(cells[i].layer);
+    if (has_core[i]) with_core.push_back(cells[i].layer);
   }
   const auto mark = [&](std::vector<Layer> layers, WallKind kind) {
     if (layers.empty()) return;

@@ -31,8 +31,15 @@ class Mesh:
 
     def box(self, low, high, material):
         points = [tuple((low, high)[i >> axis & 1][axis] for axis in range(3)) for i in range(8)]
-        faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
-        self.add(points, faces, material)
+        self.cuboid(points, material)
+
+    def cuboid(self, points, material):
+        """Eight corners, as bits of their number say."""
+        self.add(points, [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)], material)
+
+    def slab(self, low, high, material):
+        """Between two quads."""
+        self.add(low + high, [(3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)], material)
 
     def tube(self, path, radius, material, sides=6):
         """Along points; radius: a number, or a function of the place in [0, 1]. Open at its ends."""
@@ -153,7 +160,7 @@ def tiles():
             at = lambda dx, along, up: (x + dx, (s + along) * rise + up * run, (s + along) * run - up * rise)
             low = [at(0.03, 0, 0.15), at(0.97, 0, 0.15), at(0.97, 1, 0.05), at(0.03, 1, 0.05)]
             high = [at(0.03, 0, 0.25), at(0.97, 0, 0.25), at(0.97, 1, 0.15), at(0.03, 1, 0.15)]
-            mesh.add(low + high, [(3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)], "clay")
+            mesh.slab(low, high, "clay")
     return mesh
 
 

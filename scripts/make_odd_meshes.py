@@ -24,7 +24,7 @@ def turned_box(mesh, middle, size, normal, name):
     for i in range(8):
         offset = [(0.5 if i >> axis & 1 else -0.5) * size[axis] for axis in range(3)]
         points.append(tuple(middle[j] + sum(o * axis[j] for o, axis in zip(offset, axes)) for j in range(3)))
-    mesh.add(points, [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)], name)
+    mesh.cuboid(points, name)
 
 
 def ball(mesh, middle, radius, name, rings=8):
@@ -210,11 +210,9 @@ def stairs():
     for i in range(60):
         turn, y = 0.3 * i, 0.25 * i
         c, s = math.cos(turn), math.sin(turn)
-        points = []
-        for up in (0, 0.06):
-            for r, aside in ((0.2, -0.15), (2.2, -0.42), (2.2, 0.42), (0.2, 0.15)):
-                points.append((r * c - aside * s, y + up, r * s + aside * c))
-        mesh.add(points, [(3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)], "wood")
+        low, high = ([(r * c - aside * s, y + up, r * s + aside * c) for r, aside in ((0.2, -0.15), (2.2, -0.42), (2.2, 0.42), (0.2, 0.15))]
+                     for up in (0, 0.06))
+        mesh.slab(low, high, "wood")
         mesh.tube([(2.1 * c, y + 0.5 * t, 2.1 * s) for t in range(3)], 0.025, "paint", 8)
     mesh.tube([(2.1 * math.cos(0.1 * k), 1 + k / 12, 2.1 * math.sin(0.1 * k)) for k in range(178)], 0.04, "paint", 8)
     mesh.tube([(0, 0.25 * k, 0) for k in range(64)], 0.2, "steel", 12)

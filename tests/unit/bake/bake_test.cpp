@@ -179,6 +179,14 @@ std::vector<std::unique_ptr<LevelFile>> open_levels(const fs::path& out) {
   return levels;
 }
 
+/// Levels 16^3 to 4^3 of this and itself; none where the bake fails.
+std::vector<std::unique_ptr<LevelFile>> bake_all_levels(ImportedAsset asset, const fs::path& out) {
+  const auto report = bake(std::move(asset), "boards.obj", out, all_pay_from_16());
+  EXPECT_TRUE(report) << report.error().message;
+  if (!report) return {};
+  return open_levels(out);
+}
+
 TEST_F(Bake, WritesACascadeThatOpensAndShrinks) {
   const auto report = bake(ball_in_leaves(), "thing.obj", out(), small_options());
   ASSERT_TRUE(report.has_value()) << report.error().message;
@@ -507,9 +515,7 @@ TEST_F(Bake, OfBoardsWithNarrowGapsStaysASurface) {
 }
 
 TEST_F(Bake, OfBoardsApartIsASheetWithGaps) {
-  const auto report = bake(boards(0.5f), "boards.obj", out(), all_pay_from_16());
-  ASSERT_TRUE(report) << report.error().message;
-  const auto levels = open_levels(out());
+  const auto levels = bake_all_levels(boards(0.5f), out());
   ASSERT_EQ(levels.size(), 4u);
   for (const size_t grid_16_or_8 : {1u, 2u}) {
     const LevelView& sheet = levels[grid_16_or_8]->view();
@@ -521,9 +527,7 @@ TEST_F(Bake, OfBoardsApartIsASheetWithGaps) {
 }
 
 TEST_F(Bake, OfBoardsAroundAWallShowsBoth) {
-  const auto report = bake(boards_around_a_wall(), "boards.obj", out(), all_pay_from_16());
-  ASSERT_TRUE(report) << report.error().message;
-  const auto levels = open_levels(out());
+  const auto levels = bake_all_levels(boards_around_a_wall(), out());
   ASSERT_EQ(levels.size(), 4u);
   for (const size_t grid_16_or_8 : {1u, 2u}) {
     const LevelView& wall = levels[grid_16_or_8]->view();

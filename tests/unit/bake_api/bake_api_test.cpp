@@ -19,6 +19,7 @@
 #include "prefilter/subdivide.h"
 #include "tests/support/files.h"
 #include "tests/support/png_files.h"
+#include "tests/support/raise_to.h"
 
 namespace farfield {
 namespace {
@@ -243,8 +244,7 @@ TEST_F(BakeApi, AFunctionThatTakesManyPlacesBakesTheSame) {
   input.material_batch_function = [ask = input.material_function, &most](const MaterialQuery* queries,
                                                                          MaterialSample* samples, size_t count) {
     for (size_t i = 0; i < count; ++i) samples[i] = ask(queries[i]);
-    for (size_t seen = most; seen < count && !most.compare_exchange_weak(seen, count);) {
-    }
+    test::raise_to(most, count);
   };
   input.material_function = {};
   ASSERT_TRUE(bake_meshes(input, out("many"), small_settings()));

@@ -13,6 +13,7 @@
 
 #include "base/hash.h"
 #include "base/parallel.h"
+#include "tests/support/raise_to.h"
 
 namespace farfield {
 namespace {
@@ -315,9 +316,7 @@ TEST_F(ResidencyTest, SeveralLoadsRunAtATimeWhereTheyFit) {
     for (int i = 0; i < 2; ++i) {
       ResidencyItem slow = item(50, 50);
       slow.load = [&, load = slow.load](const LoadTerms& terms) {
-        const int now = ++running;
-        for (int seen = most; seen < now && !most.compare_exchange_weak(seen, now);) {  // the other writes, too
-        }
+        test::raise_to(most, ++running);
         for (int wait = 0; wait < 1000 && do_fit && most < 2; ++wait)
           std::this_thread::sleep_for(std::chrono::milliseconds(10));
         if (!do_fit) std::this_thread::sleep_for(std::chrono::milliseconds(20));
